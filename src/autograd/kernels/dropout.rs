@@ -1,0 +1,78 @@
+//! Dropout masks from a counter-based generator: made again wherever they are needed, never stored.
+
+use super::{Real, vectorised};
+
+/// The mask of one dropout: for each index, whether it is kept, as a pure function of a key.
+///
+/// An element is kept with probability 1 - p, p rounded to a multiple of 2^-16. The same bits on
+/// every CPU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dropout {
+    first: u32,
+    second: u32,
+    threshold: u32,
+    scale: f64,
+}
+
+impl Dropout {
+    /// The mask of stream `key` that drops with probability `p` in 0 to 1.
+    pub fn new(key: u64, p: f64) -> Self {
+        // SplitMix64's output function, so that neighbouring keys give unrelated masks.
+        let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        Self {
+            first: z as u32,
+            second: (z >> 32) as u32,
+            threshold: (p * 65_536.0).round() as u32,
+            scale: if p < 1.0 { 1.0 / (1.0 - p) } else { 0.0 },
+        }
+    }
+
+    /// Whether element `index` is kept.
+    #[inline(always)]
+    pub fn keep(&self, index: u32) -> bool {
+        // The hash "lowbias32" with the key's halves mixed in.
+        let mut h = index ^ self.first;
+        h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d) ^ self.second;
+        h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
+        (h >> 16) >= self.threshold
+    }
+
+    /// What element `index` is multiplied with: 1 / (1 - p) or 0.
+    #[inline(always)]
+    pub fn factor<T: Real>(&self, index: u32) -> T {
+        if self.keep(index) {
+            T::from_f64(self.scale)
+        } else {
+            T::zero()
+        }
+    }
+}
+
+/// `out[i] = x[i] * mask[i] / (1 - p)` with the mask of stream `key` (see [`Dropout`]).
+///
+/// # Panics
+/// When the lengths differ or exceed 2^32.
+#[track_caller]
+pub fn dropout_into<T: Real>(key: u64, p: f64, x: &[T], out: &mut [T]) {
+    assert_eq!(
+        x.len(),
+        out.len(),
+        "dropout from and into slices of unlike lengths"
+    );
+    assert!(
+        x.len() as u64 <= 1 << 32,
+        "a dropout mask has at most 2^32 elements"
+    );
+    let mask = Dropout::new(key, p);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (i, (out, x)) in out.iter_mut().zip(x).enumerate() {
+                *out = *x * mask.factor(i as u32);
+            }
+        },
+    );
+}

@@ -1,0 +1,119 @@
+//! Row-major matrices that are views into slices.
+
+/// A matrix to read: row-major, columns adjacent.
+#[derive(Clone, Copy, Debug)]
+pub struct Mat<'a, T> {
+    /// The numbers; element `(i, j)` at `i * stride + j`.
+    pub data: &'a [T],
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+    /// Distance between the starts of two adjacent rows, at least `cols`.
+    pub stride: usize,
+}
+
+/// A matrix to write: row-major, columns adjacent.
+#[derive(Debug)]
+pub struct MatMut<'a, T> {
+    /// The numbers; element `(i, j)` at `i * stride + j`.
+    pub data: &'a mut [T],
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+    /// Distance between the starts of two adjacent rows, at least `cols`.
+    pub stride: usize,
+}
+
+/// Panics unless `rows` rows of `cols` numbers, `stride` apart, lie within `len` numbers.
+#[inline]
+#[track_caller]
+fn check(len: usize, rows: usize, cols: usize, stride: usize) {
+    if rows == 0 || cols == 0 {
+        return;
+    }
+    assert!(
+        rows == 1 || stride >= cols,
+        "rows of a {rows} x {cols} matrix overlap at stride {stride}"
+    );
+    let needed = (rows - 1)
+        .checked_mul(stride)
+        .and_then(|start| start.checked_add(cols));
+    assert!(
+        needed.is_some_and(|needed| needed <= len),
+        "a {rows} x {cols} matrix of stride {stride} does not fit in {len} numbers"
+    );
+}
+
+impl<'a, T> Mat<'a, T> {
+    /// A matrix without gaps between its rows.
+    ///
+    /// # Panics
+    /// When `data` holds fewer than `rows * cols` numbers.
+    #[inline]
+    #[track_caller]
+    pub fn new(data: &'a [T], rows: usize, cols: usize) -> Self {
+        Self::strided(data, rows, cols, cols)
+    }
+
+    /// A matrix whose rows start `stride` numbers apart.
+    ///
+    /// # Panics
+    /// When the rows overlap or do not lie within `data`.
+    #[inline]
+    #[track_caller]
+    pub fn strided(data: &'a [T], rows: usize, cols: usize, stride: usize) -> Self {
+        check(data.len(), rows, cols, stride);
+        Self {
+            data,
+            rows,
+            cols,
+            stride,
+        }
+    }
+
+    /// Checks the shape again: the fields are open, and kernels rely on it.
+    #[inline]
+    #[track_caller]
+    pub(super) fn checked(self) -> Self {
+        check(self.data.len(), self.rows, self.cols, self.stride);
+        self
+    }
+}
+
+impl<'a, T> MatMut<'a, T> {
+    /// A matrix without gaps between its rows.
+    ///
+    /// # Panics
+    /// When `data` holds fewer than `rows * cols` numbers.
+    #[inline]
+    #[track_caller]
+    pub fn new(data: &'a mut [T], rows: usize, cols: usize) -> Self {
+        Self::strided(data, rows, cols, cols)
+    }
+
+    /// A matrix whose rows start `stride` numbers apart.
+    ///
+    /// # Panics
+    /// When the rows overlap or do not lie within `data`.
+    #[inline]
+    #[track_caller]
+    pub fn strided(data: &'a mut [T], rows: usize, cols: usize, stride: usize) -> Self {
+        check(data.len(), rows, cols, stride);
+        Self {
+            data,
+            rows,
+            cols,
+            stride,
+        }
+    }
+
+    /// Checks the shape again: the fields are open, and kernels rely on it.
+    #[inline]
+    #[track_caller]
+    pub(super) fn checked(self) -> Self {
+        check(self.data.len(), self.rows, self.cols, self.stride);
+        self
+    }
+}

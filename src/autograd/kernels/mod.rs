@@ -1,0 +1,28 @@
+//! The arithmetic under the engine: matrix products, vectorised exponentials, dropout masks.
+//!
+//! The only place of the crate with `unsafe` code. Everything public here is safe: operands are
+//! slices with a shape, and a shape that does not fit its slice or its partners panics.
+//!
+//! An instruction set is chosen once, at run time ([`Isa`]). f32 products have kernels of their own
+//! for AVX-512 and for AVX2 with FMA; f64 products, and f32 products on other CPUs, go to
+//! `matrixmultiply`.
+#![allow(unsafe_code)]
+
+mod dropout;
+mod isa;
+mod math;
+mod matrix;
+mod packed;
+mod portable;
+mod product;
+mod real;
+
+#[cfg(test)]
+mod tests;
+
+pub use dropout::{Dropout, dropout_into};
+pub use isa::{Isa, vectorised};
+pub use matrix::{Mat, MatMut};
+pub use packed::Packed;
+pub use product::{product, product_at, product_bt, product_packed};
+pub use real::Real;

@@ -1,0 +1,2 @@
+//! Reverse-mode differentiation of array programs.
+pub mod kernels;
