@@ -1,0 +1,57 @@
+//! Dropout.
+//!
+//! y = x m / (1 - p), m drawn 0 with probability p, else 1; dX = dY m / (1 - p). The mask is drawn again on the way back.
+
+use crate::autograd::kernels::dropout_into;
+use crate::autograd::{Backward, Operation, Real, Tape, Var};
+
+struct Dropout {
+    x: Var,
+    p: f64,
+    key: u64,
+}
+
+impl<T: Real> Operation<T> for Dropout {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        if !context.needs_gradient(self.x) {
+            return;
+        }
+        let mut dx = context.take(dy.len());
+        dropout_into(self.key, self.p, dy, &mut dx);
+        if let Some(target) = context.target(self.x) {
+            target.add(|i| dx[i]);
+        }
+        context.give(dx);
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself where dropout is off.
+    pub fn dropout(&mut self, x: Var, p: f64) -> Var {
+        let Some(key) = self.next_dropout_key().filter(|_| p > 0.0) else {
+            return x;
+        };
+        let shape = self.shape(x).to_vec();
+        let mut y = self.take(self.values(x).len());
+        dropout_into(key, p, self.values(x), &mut y);
+        self.record("dropout", &[x], &shape, y, || Dropout { x, p, key })
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), 0.0..0.9, any::<u64>())
+            .prop_map(|(x, p, seed)| {
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    tape.set_dropout(Some(seed));
+                    Ok(tape.dropout(v[0], p))
+                })
+            })
+            .boxed()
+    }
+}

@@ -1,0 +1,241 @@
+//! One step of an LSTM, its four gates fused.
+//!
+//! x [B, in], state [B, 2H] = (h | c), W_ih [4H, in], W_hh [4H, H], b_ih, b_hh [4H] -> new state [B, 2H]:
+//! (i, f, g, o) = x W_ih^T + h W_hh^T + b_ih + b_hh, sigmoid on i, f, o and tanh on g;
+//! c' = f c + i g, h' = o tanh(c').
+
+use super::linear::{bias_gradient, input_gradient};
+use super::shapes_error;
+use crate::autograd::kernels::{Mat, MatMut, product, product_bt, product_packed, vectorised};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
+
+/// Weights of an LSTM cell on a tape, named and laid out as in PyTorch.
+#[derive(Debug, Clone, Copy)]
+pub struct LstmWeights {
+    /// `[4H, in]`
+    pub weight_ih: Var,
+    /// `[4H, H]`
+    pub weight_hh: Var,
+    /// `[4H]`
+    pub bias_ih: Var,
+    /// `[4H]`
+    pub bias_hh: Var,
+}
+
+struct LstmCell<T> {
+    x: Var,
+    state: Var,
+    weights: LstmWeights,
+    batch: usize,
+    inputs: usize,
+    hidden: usize,
+    /// The gates after their functions, `[B, 4H]`.
+    gates: Vec<T>,
+}
+
+impl<T: Real> Operation<T> for LstmCell<T> {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        let (batch, n) = (self.batch, self.hidden);
+        let before = context.values(self.state);
+        let after = context.output();
+        let mut dgates = context.take(batch * 4 * n);
+        let mut tanh_c = context.take(batch * n);
+        for b in 0..batch {
+            let c = &after[b * 2 * n + n..(b + 1) * 2 * n];
+            tanh_c[b * n..(b + 1) * n].copy_from_slice(c);
+        }
+        T::tanh_slice(&mut tanh_c);
+        let one = T::one();
+        vectorised(
+            #[inline(always)]
+            || {
+                for b in 0..batch {
+                    let (dh, dc) = dy[b * 2 * n..(b + 1) * 2 * n].split_at_mut(n);
+                    let gates = &self.gates[b * 4 * n..(b + 1) * 4 * n];
+                    let (i, rest) = gates.split_at(n);
+                    let (f, rest) = rest.split_at(n);
+                    let (g, o) = rest.split_at(n);
+                    let dgates = &mut dgates[b * 4 * n..(b + 1) * 4 * n];
+                    let (di, rest) = dgates.split_at_mut(n);
+                    let (df, rest) = rest.split_at_mut(n);
+                    let (dg, d_o) = rest.split_at_mut(n);
+                    let c = &before[b * 2 * n + n..(b + 1) * 2 * n];
+                    let tanh_c = &tanh_c[b * n..(b + 1) * n];
+                    for j in 0..n {
+                        let dc_new = dc[j] + dh[j] * o[j] * (one - tanh_c[j] * tanh_c[j]);
+                        di[j] = dc_new * g[j] * i[j] * (one - i[j]);
+                        df[j] = dc_new * c[j] * f[j] * (one - f[j]);
+                        dg[j] = dc_new * i[j] * (one - g[j] * g[j]);
+                        d_o[j] = dh[j] * tanh_c[j] * o[j] * (one - o[j]);
+                        dc[j] = dc_new * f[j];
+                    }
+                }
+            },
+        );
+        let w = self.weights;
+        bias_gradient(context, w.bias_ih, &dgates);
+        bias_gradient(context, w.bias_hh, &dgates);
+        let d = Mat::new(&dgates, batch, 4 * n);
+        let x = Mat::new(context.values(self.x), batch, self.inputs);
+        context.weight_gradient(w.weight_ih, d, x);
+        context.weight_gradient(w.weight_hh, d, Mat::strided(before, batch, n, 2 * n));
+        input_gradient(context, self.x, w.weight_ih, d, self.inputs);
+        let packed = context.packed(w.weight_hh);
+        let weight = context.values(w.weight_hh);
+        if let Some(target) = context.target(self.state) {
+            let fresh = target.fresh;
+            for (target, dy) in target
+                .data
+                .chunks_exact_mut(2 * n)
+                .zip(dy.chunks_exact(2 * n))
+            {
+                if fresh {
+                    target[n..].copy_from_slice(&dy[n..]);
+                } else {
+                    target[n..].iter_mut().zip(&dy[n..]).for_each(|(t, &d)| *t += d);
+                }
+            }
+            let dh = MatMut::strided(target.data, batch, n, 2 * n);
+            match packed {
+                Some(packed) => product_packed(d, packed, dh, !fresh),
+                None => product(d, Mat::new(weight, 4 * n, n), dh, !fresh),
+            }
+        }
+        context.give(dgates);
+        context.give(tanh_c);
+    }
+
+    fn release(&mut self, workspace: &mut Workspace<T>) {
+        workspace.give(std::mem::take(&mut self.gates));
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// One LSTM step: `x [B, in]` and `state [B, 2H]` (h beside c) give the new state `[B, 2H]`.
+    ///
+    /// # Errors
+    /// Shapes that do not fit.
+    pub fn lstm_cell(
+        &mut self,
+        x: Var,
+        state: Var,
+        weights: LstmWeights,
+    ) -> Result<Var, AutogradError> {
+        let LstmWeights {
+            weight_ih,
+            weight_hh,
+            bias_ih,
+            bias_hh,
+        } = weights;
+        let (&[batch, inputs], &[states, width]) = (self.shape(x), self.shape(state)) else {
+            let (left, right) = (self.shape(x), self.shape(state));
+            let expected = "x [B, in] and state [B, 2H]";
+            return Err(shapes_error("lstm_cell", left, right, expected));
+        };
+        let n = width / 2;
+        if states != batch || width != 2 * n || n == 0 {
+            let (left, right) = (self.shape(x), self.shape(state));
+            let expected = "x [B, in] and state [B, 2H]";
+            return Err(shapes_error("lstm_cell", left, right, expected));
+        }
+        for (weight, wanted) in [
+            (weight_ih, &[4 * n, inputs][..]),
+            (weight_hh, &[4 * n, n][..]),
+            (bias_ih, &[4 * n][..]),
+            (bias_hh, &[4 * n][..]),
+        ] {
+            if self.shape(weight) != wanted {
+                let expected = "weights [4H, in], [4H, H] and biases [4H]";
+                let found = self.shape(weight);
+                return Err(shapes_error("lstm_cell", wanted, found, expected));
+            }
+        }
+        let mut gates = self.take(batch * 4 * n);
+        let before = self.values(state);
+        let h = Mat::strided(before, batch, n, 2 * n);
+        for (weight, input, accumulate) in [
+            (weight_ih, Mat::new(self.values(x), batch, inputs), false),
+            (weight_hh, h, true),
+        ] {
+            let out = MatMut::new(&mut gates, batch, 4 * n);
+            match self.packed_transposed(weight) {
+                Some(packed) => product_packed(input, packed, out, accumulate),
+                None => {
+                    let weight = Mat::new(self.values(weight), 4 * n, input.cols);
+                    product_bt(input, weight, out, accumulate);
+                }
+            }
+        }
+        let (b_ih, b_hh) = (self.values(bias_ih), self.values(bias_hh));
+        for row in gates.chunks_exact_mut(4 * n) {
+            for ((gate, &a), &b) in row.iter_mut().zip(b_ih).zip(b_hh) {
+                *gate += a + b;
+            }
+            T::sigmoid_slice(&mut row[..2 * n]);
+            T::tanh_slice(&mut row[2 * n..3 * n]);
+            T::sigmoid_slice(&mut row[3 * n..]);
+        }
+        let mut y = self.take(batch * 2 * n);
+        let before = self.values(state);
+        for b in 0..batch {
+            let gates = &gates[b * 4 * n..(b + 1) * 4 * n];
+            let c = &before[b * 2 * n + n..(b + 1) * 2 * n];
+            let (h_new, c_new) = y[b * 2 * n..(b + 1) * 2 * n].split_at_mut(n);
+            for j in 0..n {
+                c_new[j] = gates[n + j] * c[j] + gates[j] * gates[2 * n + j];
+            }
+            h_new.copy_from_slice(c_new);
+            T::tanh_slice(h_new);
+            for j in 0..n {
+                h_new[j] *= gates[3 * n + j];
+            }
+        }
+        if !self.is_recording() {
+            self.give(std::mem::take(&mut gates));
+        }
+        let all = [x, state, weight_ih, weight_hh, bias_ih, bias_hh];
+        Ok(self.record("lstm_cell", &all, &[batch, 2 * n], y, || LstmCell {
+            x,
+            state,
+            weights,
+            batch,
+            inputs,
+            hidden: n,
+            gates,
+        }))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use super::LstmWeights;
+    use crate::autograd::check::property::{Case, case};
+
+    /// Two steps through time, so that the state's gradient flows back and the weights' adds up.
+    pub fn cases() -> BoxedStrategy<Case> {
+        (0usize..3, 0usize..4, 1usize..3, any::<u64>())
+            .prop_map(|(batch, inputs, n, seed)| {
+                let shapes: [&[usize]; 6] = [
+                    &[batch, inputs],
+                    &[batch, 2 * n],
+                    &[4 * n, inputs],
+                    &[4 * n, n],
+                    &[4 * n],
+                    &[4 * n],
+                ];
+                case(&shapes, seed, 0.0, |tape, v| {
+                    let weights = LstmWeights {
+                        weight_ih: v[2],
+                        weight_hh: v[3],
+                        bias_ih: v[4],
+                        bias_hh: v[5],
+                    };
+                    let state = tape.lstm_cell(v[0], v[1], weights)?;
+                    tape.lstm_cell(v[0], state, weights)
+                })
+            })
+            .boxed()
+    }
+}

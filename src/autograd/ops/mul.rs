@@ -1,0 +1,60 @@
+//! Product of two values, element by element.
+//!
+//! c = a * b, with a and b broadcast to c's shape; dA = dC * b, dB = dC * a, summed over the broadcast axes.
+
+use super::broadcast::{add_reduced, broadcast_shape, zip_into};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
+
+struct Mul {
+    a: Var,
+    b: Var,
+    shape: Vec<usize>,
+}
+
+impl<T: Real> Operation<T> for Mul {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        for (operand, other) in [(self.a, self.b), (self.b, self.a)] {
+            let shape = context.shape(operand);
+            let factor = context.array(other);
+            if let Some(target) = context.target(operand) {
+                let mut gradient = dy.to_vec();
+                if let Some(factor) = factor.broadcast(self.shape.as_slice()) {
+                    for (d, &x) in gradient.iter_mut().zip(factor.iter()) {
+                        *d *= x;
+                    }
+                }
+                add_reduced(target, shape, &self.shape, gradient);
+            }
+        }
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// a * b, elementwise with broadcasting.
+    ///
+    /// # Errors
+    /// Shapes that do not broadcast together.
+    pub fn mul(&mut self, a: Var, b: Var) -> Result<Var, AutogradError> {
+        let shape = broadcast_shape("mul", self.shape(a), self.shape(b))?;
+        let mut y = self.take(shape.iter().product());
+        zip_into(&mut y, &shape, self.array(a), self.array(b), |x, y| x * y);
+        Ok(self.record("mul", &[a, b], &shape, y, || Mul {
+            a,
+            b,
+            shape: shape.clone(),
+        }))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, broadcast_shapes, case};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (broadcast_shapes(), any::<u64>())
+            .prop_map(|((a, b), seed)| case(&[&a, &b], seed, 0.0, |tape, v| tape.mul(v[0], v[1])))
+            .boxed()
+    }
+}

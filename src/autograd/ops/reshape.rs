@@ -1,0 +1,53 @@
+//! The same numbers under another shape.
+//!
+//! y = x; dX = dY.
+
+use super::shapes_error;
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
+
+struct Reshape {
+    x: Var,
+}
+
+impl<T: Real> Operation<T> for Reshape {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        if let Some(target) = context.target(self.x) {
+            target.add(|i| dy[i]);
+        }
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// The numbers of `x` in row-major order under `shape`.
+    ///
+    /// # Errors
+    /// A shape with another number of numbers.
+    pub fn reshape(&mut self, x: Var, shape: &[usize]) -> Result<Var, AutogradError> {
+        if shape.iter().product::<usize>() != self.values(x).len() {
+            let expected = "as many numbers on both sides";
+            return Err(shapes_error("reshape", self.shape(x), shape, expected));
+        }
+        let mut y = self.take(self.values(x).len());
+        y.copy_from_slice(self.values(x));
+        Ok(self.record("reshape", &[x], shape, y, || Reshape { x }))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| {
+                let mut reversed = x.clone();
+                reversed.reverse();
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    tape.reshape(v[0], &reversed)
+                })
+            })
+            .boxed()
+    }
+}

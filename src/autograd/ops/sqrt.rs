@@ -1,0 +1,36 @@
+//! Square root.
+//!
+//! y = sqrt(x); dX = dY / (2 y).
+
+use super::unary::unary;
+use crate::autograd::{Real, Tape, Var};
+
+impl<T: Real> Tape<'_, T> {
+    /// sqrt(x) for x > 0, elementwise.
+    pub fn sqrt(&mut self, x: Var) -> Var {
+        unary(
+            self,
+            "sqrt",
+            x,
+            |values| values.iter_mut().for_each(|x| *x = x.sqrt()),
+            |_, y| T::one() / (y + y),
+        )
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| case(&[&x], seed, 0.0, |tape, v| {
+                let square = tape.square(v[0]);
+                let shift = tape.affine(square, 1.0, 0.3);
+                Ok(tape.sqrt(shift))
+            }))
+            .boxed()
+    }
+}

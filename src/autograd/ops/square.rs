@@ -1,0 +1,32 @@
+//! Square.
+//!
+//! y = x^2; dX = dY * 2 x.
+
+use super::unary::unary;
+use crate::autograd::{Real, Tape, Var};
+
+impl<T: Real> Tape<'_, T> {
+    /// x^2, elementwise.
+    pub fn square(&mut self, x: Var) -> Var {
+        unary(
+            self,
+            "square",
+            x,
+            |values| values.iter_mut().for_each(|x| *x = *x * *x),
+            |x, _| x + x,
+        )
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| case(&[&x], seed, 0.0, |tape, v| Ok(tape.square(v[0]))))
+            .boxed()
+    }
+}

@@ -1,0 +1,42 @@
+//! Sum of all numbers.
+//!
+//! x [..] -> y [1]; dX = dY everywhere.
+
+use crate::autograd::reduce::sum_with;
+use crate::autograd::{Backward, Operation, Real, Tape, Var};
+
+struct Sum {
+    x: Var,
+}
+
+impl<T: Real> Operation<T> for Sum {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        let upstream = dy[0];
+        if let Some(target) = context.target(self.x) {
+            target.add(|_| upstream);
+        }
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// Sum of all numbers of `x`, as `[1]`.
+    pub fn sum(&mut self, x: Var) -> Var {
+        let mut y = self.take(1);
+        let values = self.values(x);
+        y[0] = sum_with(values.len(), |i| values[i]);
+        self.record("sum", &[x], &[1], y, || Sum { x })
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| case(&[&x], seed, 0.0, |tape, v| Ok(tape.sum(v[0]))))
+            .boxed()
+    }
+}

@@ -1,0 +1,57 @@
+//! Euclidean norm along the last axis, smooth at 0.
+//!
+//! x [.., n] -> y [..], y = sqrt(x . x + eps); dX = dY x / y.
+
+use super::argument_error;
+use crate::autograd::reduce::sum_with;
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
+
+struct VectorNorm {
+    x: Var,
+    columns: usize,
+}
+
+impl<T: Real> Operation<T> for VectorNorm {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        let (x, y, columns) = (context.values(self.x), context.output(), self.columns);
+        if let Some(target) = context.target(self.x) {
+            target.add(|i| dy[i / columns] * x[i] / y[i / columns]);
+        }
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// Norms of the rows of `x [.., n]`, as `[..]`; `eps` (above 0) keeps the gradient finite at 0.
+    ///
+    /// # Errors
+    /// A value without axes.
+    pub fn vector_norm(&mut self, x: Var, eps: f64) -> Result<Var, AutogradError> {
+        let Some((&columns, shape)) = self.shape(x).split_last() else {
+            let argument = "its last axis".into();
+            let expected = "one axis or more";
+            return Err(argument_error("vector_norm", &[], argument, expected));
+        };
+        let shape = shape.to_vec();
+        let eps = T::from_f64(eps);
+        let mut y = self.take(shape.iter().product());
+        let values = self.values(x);
+        for (row, y) in y.iter_mut().enumerate() {
+            let row = &values[row * columns..(row + 1) * columns];
+            *y = (sum_with(columns, |j| row[j] * row[j]) + eps).sqrt();
+        }
+        Ok(self.record("vector_norm", &[x], &shape, y, || VectorNorm { x, columns }))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| case(&[&x], seed, 0.1, |tape, v| tape.vector_norm(v[0], 1e-3)))
+            .boxed()
+    }
+}

@@ -1,0 +1,194 @@
+//! Weights by name, blocks of their rows, and the gradients that a backward pass adds up.
+
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use ndarray::ArrayD;
+
+use super::kernels::{Mat, Packed, Real};
+
+/// A parameter of a [`Parameters`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ParameterId(pub(super) usize);
+
+/// A range of rows of a parameter (all of them, or a part such as the keys' rows of `in_proj_weight`): what a tape sees of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct BlockId(pub(super) usize);
+
+#[derive(Debug)]
+struct Parameter<T> {
+    name: String,
+    value: ArrayD<T>,
+}
+
+#[derive(Debug)]
+struct Block<T> {
+    parameter: usize,
+    /// Numbers of the parameter that the block covers.
+    range: Range<usize>,
+    shape: Vec<usize>,
+    /// The block as a right operand, W [out, in] and its transpose, packed when first used after an update.
+    packed: OnceLock<Packed<T>>,
+    packed_transposed: OnceLock<Packed<T>>,
+}
+
+/// Named weights. Shared read-only by the tapes of a step; changed between steps only.
+#[derive(Debug, Default)]
+pub struct Parameters<T> {
+    parameters: Vec<Parameter<T>>,
+    blocks: Vec<Block<T>>,
+}
+
+impl<T: Real> Parameters<T> {
+    pub fn new() -> Self {
+        Self {
+            parameters: Vec::new(),
+            blocks: Vec::new(),
+        }
+    }
+
+    /// Adds a parameter and the block that covers it whole.
+    pub fn add(&mut self, name: impl Into<String>, value: ArrayD<T>) -> (ParameterId, BlockId) {
+        let id = ParameterId(self.parameters.len());
+        let value = value.as_standard_layout().into_owned();
+        let (len, shape) = (value.len(), value.shape().to_vec());
+        self.parameters.push(Parameter {
+            name: name.into(),
+            value,
+        });
+        (id, self.add_block(id, 0..len, shape))
+    }
+
+    /// The block of a parameter's rows in `rows` (clamped to the rows there are).
+    pub fn rows(&mut self, id: ParameterId, rows: Range<usize>) -> BlockId {
+        let value = &self.parameters[id.0].value;
+        let mut shape = value.shape().to_vec();
+        let total = shape.first().copied().unwrap_or(1);
+        let (start, end) = (rows.start.min(total), rows.end.min(total));
+        let width = value.len() / total.max(1);
+        if let Some(first) = shape.first_mut() {
+            *first = end.saturating_sub(start);
+        }
+        self.add_block(id, start * width..end.max(start) * width, shape)
+    }
+
+    fn add_block(&mut self, id: ParameterId, range: Range<usize>, shape: Vec<usize>) -> BlockId {
+        self.blocks.push(Block {
+            parameter: id.0,
+            range,
+            shape,
+            packed: OnceLock::new(),
+            packed_transposed: OnceLock::new(),
+        });
+        BlockId(self.blocks.len() - 1)
+    }
+
+    /// Number of parameters (arrays).
+    pub fn len(&self) -> usize {
+        self.parameters.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.parameters.is_empty()
+    }
+
+    /// Number of weights in all parameters together.
+    pub fn weights(&self) -> usize {
+        self.parameters.iter().map(|p| p.value.len()).sum()
+    }
+
+    pub(super) fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// Names and values, in the order in which the parameters were added.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &ArrayD<T>)> {
+        self.parameters
+            .iter()
+            .map(|parameter| (parameter.name.as_str(), &parameter.value))
+    }
+
+    /// The values one after another, to be changed; what was packed of them is forgotten.
+    pub fn values_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
+        for block in &mut self.blocks {
+            block.packed.take();
+            block.packed_transposed.take();
+        }
+        self.parameters
+            .iter_mut()
+            .map(|parameter| (parameter.name.as_str(), &mut parameter.value))
+    }
+
+    pub(super) fn block_shape(&self, id: BlockId) -> &[usize] {
+        &self.blocks[id.0].shape
+    }
+
+    pub(super) fn block_values(&self, id: BlockId) -> &[T] {
+        let block = &self.blocks[id.0];
+        let values = self.parameters[block.parameter]
+            .value
+            .as_slice()
+            .unwrap_or(&[]);
+        &values[block.range.clone()]
+    }
+
+    fn block_matrix(&self, id: BlockId) -> Mat<'_, T> {
+        let shape = &self.blocks[id.0].shape;
+        let rows = shape.first().copied().unwrap_or(1);
+        let columns = shape.iter().skip(1).product();
+        Mat::new(self.block_values(id), rows, columns)
+    }
+
+    /// The block W [out, in], packed as the right operand of `d y W`.
+    pub(super) fn packed(&self, id: BlockId) -> &Packed<T> {
+        self.blocks[id.0]
+            .packed
+            .get_or_init(|| Packed::new(self.block_matrix(id)))
+    }
+
+    /// The transpose of the block W [out, in], packed as the right operand of `x W^T`.
+    pub(super) fn packed_transposed(&self, id: BlockId) -> &Packed<T> {
+        self.blocks[id.0]
+            .packed_transposed
+            .get_or_init(|| Packed::transposed(self.block_matrix(id)))
+    }
+}
+
+/// Gradients of all parameters, in their order, each in the layout of its parameter.
+#[derive(Debug, Clone, Default)]
+pub struct Gradients<T> {
+    values: Vec<Vec<T>>,
+}
+
+impl<T: Real> Gradients<T> {
+    /// Zeros for every parameter.
+    pub fn zeros(parameters: &Parameters<T>) -> Self {
+        Self {
+            values: parameters
+                .parameters
+                .iter()
+                .map(|parameter| vec![T::zero(); parameter.value.len()])
+                .collect(),
+        }
+    }
+
+    pub fn set_zero(&mut self) {
+        for values in &mut self.values {
+            values.fill(T::zero());
+        }
+    }
+
+    /// The gradients, one slice a parameter.
+    pub fn iter(&self) -> impl Iterator<Item = &[T]> {
+        self.values.iter().map(Vec::as_slice)
+    }
+
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut [T]> {
+        self.values.iter_mut().map(Vec::as_mut_slice)
+    }
+
+    pub(super) fn block_mut(&mut self, parameters: &Parameters<T>, id: BlockId) -> &mut [T] {
+        let block = &parameters.blocks[id.0];
+        &mut self.values[block.parameter][block.range.clone()]
+    }
+}

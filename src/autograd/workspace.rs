@@ -1,0 +1,69 @@
+//! Buffers that one step leaves behind for the next.
+
+use std::collections::BTreeMap;
+
+use super::kernels::Real;
+
+/// A pool of buffers by size class, so that after the first steps a training step allocates nothing large.
+///
+/// A class spans an eighth of a power of two, so that a reused buffer is at most that much longer than asked for.
+#[derive(Debug, Default)]
+pub struct Workspace<T> {
+    free: BTreeMap<usize, Vec<Vec<T>>>,
+}
+
+/// Capacity of the class that holds `len` numbers.
+fn class(len: usize) -> usize {
+    if len <= 64 {
+        return 64;
+    }
+    let step = (len.next_power_of_two() / 16).max(1);
+    len.div_ceil(step) * step
+}
+
+impl<T: Real> Workspace<T> {
+    pub fn new() -> Self {
+        Self {
+            free: BTreeMap::new(),
+        }
+    }
+
+    /// A buffer of `len` numbers, whose content is whatever an earlier step left there.
+    pub fn take(&mut self, len: usize) -> Vec<T> {
+        let class = class(len);
+        match self.free.get_mut(&class).and_then(Vec::pop) {
+            Some(mut buffer) => {
+                buffer.resize(len, T::zero());
+                buffer
+            }
+            None => {
+                let mut buffer = Vec::with_capacity(class);
+                buffer.resize(len, T::zero());
+                buffer
+            }
+        }
+    }
+
+    /// A buffer of `len` zeros.
+    pub fn take_zeroed(&mut self, len: usize) -> Vec<T> {
+        let mut buffer = self.take(len);
+        buffer.fill(T::zero());
+        buffer
+    }
+
+    /// Gives a buffer back. One that did not come from here is kept only if its capacity is that of a class.
+    pub fn give(&mut self, buffer: Vec<T>) {
+        let capacity = buffer.capacity();
+        if capacity > 0 && class(capacity) == capacity {
+            self.free.entry(capacity).or_default().push(buffer);
+        }
+    }
+
+    /// Numbers held by the free buffers.
+    pub fn held(&self) -> usize {
+        self.free
+            .iter()
+            .map(|(class, buffers)| class * buffers.len())
+            .sum()
+    }
+}
