@@ -3,4 +3,6 @@
 //! The modules in reading order, the path of the data:
 //!
 //! - [`motion`]: BVH files become clips, clips become the features of each frame.
+//! - [`data`]: clips become a data set: split, standardised, cut into windows.
+pub mod data;
 pub mod motion;

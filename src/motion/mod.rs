@@ -3,7 +3,13 @@
 //! Units: centimetres, radians, seconds; Y is up. Computed in f64.
 
 pub mod clip;
+pub mod contact;
+pub mod facing;
+pub mod features;
 pub mod skeleton;
+pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
-pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, Joint, Skeleton};
+pub use features::{FeatureConfig, FeatureError, features};
+pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
+pub use velocity_factor::{PART_WEIGHTS, PARTS, velocity_factors};
