@@ -2,6 +2,7 @@
 //!
 //! Units: centimetres, radians, seconds; Y is up. Computed in f64.
 
+pub mod bvh;
 pub mod clip;
 pub mod contact;
 pub mod facing;
