@@ -94,11 +94,40 @@ impl Skeleton {
 
     /// Whether the joints are the 24 of the dance skeleton, in its order and with its parents.
     pub fn is_dance_skeleton(&self) -> bool {
-        self.len() == JOINTS
-            && self
-                .joints
-                .iter()
-                .zip(DANCE_JOINTS.iter().zip(DANCE_PARENTS))
-                .all(|(joint, (name, parent))| joint.name == *name && joint.parent == parent)
+        self.difference_from_dance().is_none()
+    }
+
+    /// The first place where this is not the dance skeleton: its index, what the dance skeleton has there, what this one has.
+    pub fn difference_from_dance(&self) -> Option<(usize, String, String)> {
+        (0..self.len().max(JOINTS)).find_map(|index| {
+            let expected = DANCE_JOINTS
+                .get(index)
+                .map(|name| describe(name, DANCE_PARENTS[index].map(|at| DANCE_JOINTS[at])));
+            let found = self.joints.get(index).map(|joint| {
+                describe(
+                    &joint.name,
+                    joint
+                        .parent
+                        .and_then(|at| self.joints.get(at))
+                        .map(|parent| parent.name.as_str()),
+                )
+            });
+            let none = || "no further joint".to_string();
+            (expected != found).then(|| {
+                (
+                    index,
+                    expected.unwrap_or_else(none),
+                    found.unwrap_or_else(none),
+                )
+            })
+        })
+    }
+}
+
+/// "LeftLeg on LeftUpLeg", or the name alone of a joint without a parent.
+fn describe(name: &str, parent: Option<&str>) -> String {
+    match parent {
+        Some(parent) => format!("{name} on {parent}"),
+        None => name.to_string(),
     }
 }

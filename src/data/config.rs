@@ -1,0 +1,68 @@
+//! The `[data]` table of an experiment's config.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::motion::FeatureConfig;
+
+/// How clips are read, measured and split.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DataConfig {
+    /// Frames a second that clips are resampled to.
+    pub fps: f64,
+    /// A foot joint is in contact while its squared speed is below this, (cm/frame)^2.
+    pub contact_threshold: f64,
+    /// Standard deviation of the Gaussian that smooths the facing direction, frames.
+    pub facing_sigma: f64,
+    /// Which clips train and which test.
+    pub split: Split,
+    /// Share of the training clips that is kept aside for validation, at least 0 and below 1.
+    pub validation_share: f64,
+    /// Mapping file for clips on another skeleton than the dance skeleton.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mapping: Option<PathBuf>,
+}
+
+impl Default for DataConfig {
+    fn default() -> Self {
+        let FeatureConfig {
+            contact_threshold,
+            facing_sigma,
+        } = FeatureConfig::default();
+        Self {
+            fps: 30.0,
+            contact_threshold,
+            facing_sigma,
+            split: Split::Dance,
+            validation_share: 0.0,
+            mapping: None,
+        }
+    }
+}
+
+impl DataConfig {
+    /// What of this concerns the features of a clip.
+    pub fn features(&self) -> FeatureConfig {
+        FeatureConfig {
+            contact_threshold: self.contact_threshold,
+            facing_sigma: self.facing_sigma,
+        }
+    }
+}
+
+/// Which clips train and which test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Split {
+    /// The paper's split of its 123 dance clips: 98 train, 25 test; both frame counts are checked.
+    Dance,
+    /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest tests.
+    Share(f64),
+    /// Named files; files of the folder that neither list names are left out.
+    List {
+        train: Vec<String>,
+        test: Vec<String>,
+    },
+}

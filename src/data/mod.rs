@@ -1,0 +1,14 @@
+//! Data sets: clips become features, a split, standardised numbers and windows.
+
+pub mod config;
+pub mod dataset;
+mod split;
+pub mod standardise;
+pub mod window;
+pub mod windows;
+
+pub use config::{DataConfig, Split};
+pub use dataset::{DanceClip, DataError, Dataset};
+pub use standardise::Standardisation;
+pub use window::window_features;
+pub use windows::{Window, Windows, windows};

@@ -1,0 +1,65 @@
+//! The facing angle: which way the dancer looks, smoothed over time and unwrapped along the clip.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+const LEFT_HIP: usize = 1;
+const RIGHT_HIP: usize = 5;
+const RIGHT_ARM: usize = 15;
+const LEFT_ARM: usize = 19;
+
+/// Facing angle about Y of every frame, `[frames]`, rad: 0 looks along +Z, pi/2 along +X.
+///
+/// `world` holds the world positions of the dance skeleton's joints, `[frames][24]`, cm. The forward direction is smoothed with a
+/// Gaussian of standard deviation `sigma` frames before its angle is taken. The first angle lies in (-pi, pi]; from there the angle
+/// is followed without jumps of 2 pi.
+pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
+    let forward: Vec<DVec2> = world.iter().map(|positions| forward(positions)).collect();
+    let mut angles: Vec<f64> = gaussian(&forward, sigma)
+        .into_iter()
+        .map(|direction| direction.x.atan2(direction.y))
+        .collect();
+    unwrap(&mut angles);
+    angles
+}
+
+/// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts less in the smoothing.
+fn forward(positions: &[DVec3]) -> DVec2 {
+    let across =
+        (positions[LEFT_HIP] - positions[RIGHT_HIP]) + (positions[LEFT_ARM] - positions[RIGHT_ARM]);
+    let forward = across.cross(DVec3::Y);
+    DVec2::new(forward.x, forward.z)
+}
+
+/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side, and the ends of the clip are held.
+fn gaussian(values: &[DVec2], sigma: f64) -> Vec<DVec2> {
+    let radius = (4.0 * sigma + 0.5) as usize;
+    let mut kernel: Vec<f64> = (0..=2 * radius)
+        .map(|tap| {
+            let distance = tap as f64 - radius as f64;
+            (-0.5 * (distance / sigma).powi(2)).exp()
+        })
+        .collect();
+    let sum: f64 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|weight| *weight /= sum);
+    (0..values.len())
+        .map(|time| {
+            kernel
+                .iter()
+                .enumerate()
+                .map(|(tap, &weight)| {
+                    values[(time + tap).saturating_sub(radius).min(values.len() - 1)] * weight
+                })
+                .sum()
+        })
+        .collect()
+}
+
+/// Shifts each angle by a multiple of 2 pi so that it is the nearest to the one before.
+fn unwrap(angles: &mut [f64]) {
+    for time in 1..angles.len() {
+        let turns = ((angles[time] - angles[time - 1]) / TAU).round();
+        angles[time] -= turns * TAU;
+    }
+}

@@ -1,0 +1,176 @@
+//! The 154 numbers of a frame (section 3.1): what the networks read and write.
+
+use std::ops::Range;
+
+use glam::{DQuat, DVec3};
+use ndarray::{Array2, ArrayViewMut1, s};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::clip::Clip;
+use super::contact::contacts;
+use super::facing::facing_angles;
+use super::velocity_factor::velocity_factors;
+
+/// p^b: positions of the 23 joints relative to the root, turned to face +Z, cm.
+pub const BODY_POSITIONS: Range<usize> = 0..69;
+/// p^r: the root's position in the world, cm.
+pub const ROOT_POSITION: Range<usize> = 69..72;
+/// o^r: the facing angle about Y that was turned away, rad.
+pub const FACING: Range<usize> = 72..73;
+/// c: contact labels of LeftFoot, LeftToeBase, RightFoot, RightToeBase.
+pub const CONTACTS: Range<usize> = 73..77;
+/// v^b: p^b minus that of the frame before, cm/frame.
+pub const BODY_VELOCITIES: Range<usize> = 77..146;
+/// v^r: p^r minus that of the frame before, cm/frame.
+pub const ROOT_VELOCITY: Range<usize> = 146..149;
+/// f: velocity factors of trunk, left leg, right leg, right arm, left arm (eq. 1), cm/frame.
+pub const VELOCITY_FACTORS: Range<usize> = 149..154;
+/// How many of the numbers a model predicts: all but the velocity factors.
+pub const FRAME: usize = 149;
+/// How many numbers a frame has.
+pub const FEATURES: usize = 154;
+
+/// The widest smoothing of the facing direction, frames; far wider than any clip is long.
+const LONGEST_SIGMA: f64 = 1e4;
+
+/// How features are made from a clip.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeatureConfig {
+    /// A foot joint is in contact while its squared speed is below this, (cm/frame)^2.
+    pub contact_threshold: f64,
+    /// Standard deviation of the Gaussian that smooths the facing direction, frames.
+    pub facing_sigma: f64,
+}
+
+impl Default for FeatureConfig {
+    fn default() -> Self {
+        Self {
+            contact_threshold: 0.2,
+            facing_sigma: 20.0,
+        }
+    }
+}
+
+/// Why a clip has no features.
+#[derive(Debug, Error, PartialEq)]
+pub enum FeatureError {
+    /// The clip is not on the 24 joints.
+    #[error(
+        "{clip}: joint {index} is {found}, the dance skeleton has {expected} there; \
+         give a mapping file that names the clip's joints for the 24 of the dance skeleton"
+    )]
+    NotTheDanceSkeleton {
+        clip: String,
+        index: usize,
+        expected: String,
+        found: String,
+    },
+    #[error("{clip}: has no frames")]
+    NoFrames { clip: String },
+    /// A setting that no clip can be measured with.
+    #[error("{key} = {value}: expected {expected}")]
+    Config {
+        key: &'static str,
+        value: f64,
+        expected: &'static str,
+    },
+}
+
+/// Features of every frame of a clip on the dance skeleton, `[frames, 154]`, not standardised.
+///
+/// Velocities are per-frame differences at the clip's own rate: bring a clip to 30 fps first. The first frame has velocity 0, and so
+/// velocity factors 0.
+///
+/// # Errors
+/// The clip is on another skeleton or has no frames; a setting is not a positive number.
+pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, FeatureError> {
+    check(clip, config)?;
+    let world: Vec<Vec<DVec3>> = clip
+        .poses
+        .iter()
+        .map(|pose| pose.world_positions(&clip.skeleton))
+        .collect();
+    let facing = facing_angles(&world, config.facing_sigma);
+    let contacts = contacts(&world, config.contact_threshold);
+    let mut features = Array2::zeros((world.len(), FEATURES));
+    for (time, positions) in world.iter().enumerate() {
+        let mut frame = features.row_mut(time);
+        write_positions(&mut frame, positions, facing[time]);
+        for (slot, label) in CONTACTS.zip(contacts[time]) {
+            frame[slot] = label;
+        }
+    }
+    for time in 1..world.len() {
+        let velocity = |range: Range<usize>| {
+            &features.slice(s![time, range.clone()]) - &features.slice(s![time - 1, range])
+        };
+        let (body, root) = (velocity(BODY_POSITIONS), velocity(ROOT_POSITION));
+        features.slice_mut(s![time, BODY_VELOCITIES]).assign(&body);
+        features.slice_mut(s![time, ROOT_VELOCITY]).assign(&root);
+        let velocities =
+            std::array::from_fn(|number| features[[time, BODY_VELOCITIES.start + number]]);
+        for (slot, factor) in VELOCITY_FACTORS.zip(velocity_factors(&velocities)) {
+            features[[time, slot]] = factor;
+        }
+    }
+    Ok(features)
+}
+
+/// p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame.
+fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
+    let root = positions[0];
+    let turn = DQuat::from_rotation_y(-facing);
+    for (joint, &position) in positions.iter().enumerate().skip(1) {
+        let relative = (turn * (position - root)).to_array();
+        for (axis, value) in relative.into_iter().enumerate() {
+            frame[BODY_POSITIONS.start + 3 * (joint - 1) + axis] = value;
+        }
+    }
+    for (slot, value) in ROOT_POSITION.zip(root.to_array()) {
+        frame[slot] = value;
+    }
+    frame[FACING.start] = facing;
+}
+
+fn check(clip: &Clip, config: &FeatureConfig) -> Result<(), FeatureError> {
+    if let Some((index, expected, found)) = clip.skeleton.difference_from_dance() {
+        return Err(FeatureError::NotTheDanceSkeleton {
+            clip: clip.name.clone(),
+            index,
+            expected,
+            found,
+        });
+    }
+    if clip.poses.is_empty() {
+        return Err(FeatureError::NoFrames {
+            clip: clip.name.clone(),
+        });
+    }
+    let settings = [
+        (
+            "contact_threshold",
+            config.contact_threshold,
+            f64::MAX,
+            "a positive number",
+        ),
+        (
+            "facing_sigma",
+            config.facing_sigma,
+            LONGEST_SIGMA,
+            "a number of frames above 0 and at most 10000",
+        ),
+    ];
+    match settings
+        .into_iter()
+        .find(|&(_, value, largest, _)| !(value > 0.0 && value <= largest))
+    {
+        Some((key, value, _, expected)) => Err(FeatureError::Config {
+            key,
+            value,
+            expected,
+        }),
+        None => Ok(()),
+    }
+}

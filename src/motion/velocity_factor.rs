@@ -1,0 +1,67 @@
+//! Velocity factors: how fast each of the five body parts moves (eq. 1).
+
+/// Number of body parts (M = 5).
+pub const PARTS: usize = 5;
+
+/// Joint weights of each body part (figure 4): `(joint of the dance skeleton, weight)`.
+///
+/// Parts in the order trunk, left leg, right leg, right arm, left arm.
+pub const PART_WEIGHTS: [&[(usize, f64)]; PARTS] = [
+    &[
+        (0, 1.0),
+        (9, 1.0),
+        (10, 1.0),
+        (11, 1.0),
+        (12, 1.0),
+        (13, 1.0),
+        (22, 1.0),
+        (23, 2.0),
+    ],
+    &[(1, 1.0), (2, 2.0), (3, 3.0), (4, 4.0)],
+    &[(5, 1.0), (6, 2.0), (7, 3.0), (8, 4.0)],
+    &[(14, 1.0), (15, 2.0), (16, 3.0), (17, 4.0)],
+    &[(18, 1.0), (19, 2.0), (20, 3.0), (21, 4.0)],
+];
+
+/// Eq. 1: the weighted mean speed of each part's joints, `[5]`, in the unit of `velocities` (cm/frame).
+///
+/// `velocities` are v^b and v^r in one row, as they stand in a frame's features: joints 1..24, then the root.
+pub fn velocity_factors(velocities: &[f64; 72]) -> [f64; PARTS] {
+    PART_WEIGHTS.map(|part| {
+        let weighted: f64 = part
+            .iter()
+            .map(|&(joint, weight)| weight * speed(velocities, joint))
+            .sum();
+        weighted / part.iter().map(|&(_, weight)| weight).sum::<f64>()
+    })
+}
+
+/// Norm of one joint's velocity; the root's three numbers stand last.
+fn speed(velocities: &[f64; 72], joint: usize) -> f64 {
+    let at = if joint == 0 { 69 } else { 3 * (joint - 1) };
+    let [x, y, z] = [velocities[at], velocities[at + 1], velocities[at + 2]];
+    (x * x + y * y + z * z).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_moving_joint_counts_with_its_share_of_the_weights() {
+        let mut velocities = [0.0; 72];
+        velocities[3 * (17 - 1)..3 * 17].copy_from_slice(&[3.0, 0.0, 4.0]);
+        velocities[69..].copy_from_slice(&[0.0, 9.0, 0.0]);
+        assert_eq!(velocity_factors(&velocities), [1.0, 0.0, 0.0, 2.0, 0.0]);
+    }
+
+    #[test]
+    fn every_joint_belongs_to_exactly_one_part() {
+        let mut joints: Vec<usize> = PART_WEIGHTS
+            .iter()
+            .flat_map(|part| part.iter().map(|&(joint, _)| joint))
+            .collect();
+        joints.sort_unstable();
+        assert_eq!(joints, (0..24).collect::<Vec<_>>());
+    }
+}
