@@ -4,5 +4,7 @@
 //!
 //! - [`motion`]: BVH files become clips, clips become the features of each frame.
 //! - [`data`]: clips become a data set: split, standardised, cut into windows.
+//! - [`models`]: what fills the frames between two keyframes, behind one trait.
 pub mod data;
+pub mod models;
 pub mod motion;

@@ -6,6 +6,7 @@ pub mod clip;
 pub mod contact;
 pub mod facing;
 pub mod features;
+pub mod placement;
 pub mod skeleton;
 pub mod velocity_factor;
 
