@@ -5,6 +5,8 @@
 //! - [`motion`]: BVH files become clips, clips become the features of each frame.
 //! - [`data`]: clips become a data set: split, standardised, cut into windows.
 //! - [`models`]: what fills the frames between two keyframes, behind one trait.
+//! - [`evaluation`]: LRP, AVF and ART by the paper's protocol, and its tables.
 pub mod data;
+pub mod evaluation;
 pub mod models;
 pub mod motion;
