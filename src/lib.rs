@@ -6,6 +6,8 @@
 //! - [`data`]: clips become a data set: split, standardised, cut into windows.
 //! - [`models`]: what fills the frames between two keyframes, behind one trait.
 //! - [`evaluation`]: LRP, AVF and ART by the paper's protocol, and its tables.
+//! - [`cli`]: the subcommands of the binary.
+pub mod cli;
 pub mod data;
 pub mod evaluation;
 pub mod models;

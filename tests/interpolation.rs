@@ -1,8 +1,11 @@
 //! The interpolation baseline: its ends, its middle, and its scores on real clips.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
+use keydance::data::{DataConfig, Dataset};
+use keydance::evaluation::Protocol;
 use keydance::models::interpolation::Interpolation;
 use keydance::models::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
@@ -237,4 +240,39 @@ fn requests_that_do_not_fit_are_errors_not_panics() {
         assert!(result.is_err(), "case {index}");
     }
     assert!(attempt(&|_| {}).is_ok());
+}
+
+/// The folder with the dance clips: `KEYDANCE_DATA`, else `../shared/data/dance` beside the repository.
+fn dance_data() -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/dance");
+    let folder = std::env::var_os("KEYDANCE_DATA").map_or_else(beside, PathBuf::from);
+    folder.is_dir().then_some(folder)
+}
+
+/// The expected numbers come from another implementation of the features and of the protocol, on SciPy's rotations.
+#[test]
+fn scores_on_the_dance_test_clips_are_those_of_an_independent_implementation() {
+    let Some(folder) = dance_data() else {
+        println!("skipped: no dance clips; set KEYDANCE_DATA to their folder");
+        return;
+    };
+    let data = Dataset::load(&folder, &DataConfig::default()).unwrap();
+    let protocol = Protocol {
+        lengths: vec![10, 50],
+        ..Protocol::default()
+    };
+    let outcome = protocol
+        .evaluate(&Interpolation::default(), &data.test)
+        .unwrap();
+    let scores = outcome.evaluation;
+    println!("{}", serde_json::to_string(&scores).unwrap());
+    assert_eq!(scores.windows, [(10, 10316), (50, 3280)].into());
+    for (length, lrp, avf) in [(10, 22.8508470, 0.5643660), (50, 95.8120951, 0.1097561)] {
+        let found = scores.lrp.at(length).unwrap();
+        assert!((found / lrp - 1.0).abs() < 1e-4, "LRP at {length}: {found}");
+        let found = scores.avf.at(length).unwrap();
+        assert!((found - avf).abs() < 1e-3, "AVF at {length}: {found}");
+        assert_eq!(scores.art.at(length), Some(1.0));
+    }
+    assert_eq!(outcome.skipped, []);
 }

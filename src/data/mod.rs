@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod dataset;
+mod split;
 pub mod standardise;
 pub mod window;
 pub mod windows;

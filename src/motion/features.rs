@@ -31,6 +31,9 @@ pub const FRAME: usize = 149;
 /// How many numbers a frame has.
 pub const FEATURES: usize = 154;
 
+/// The widest smoothing of the facing direction, frames; far wider than any clip is long.
+const LONGEST_SIGMA: f64 = 1e4;
+
 /// How features are made from a clip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -145,17 +148,29 @@ fn check(clip: &Clip, config: &FeatureConfig) -> Result<(), FeatureError> {
             clip: clip.name.clone(),
         });
     }
-    let Some((key, value)) = [
-        ("contact_threshold", config.contact_threshold),
-        ("facing_sigma", config.facing_sigma),
-    ]
-    .into_iter()
-    .find(|(_, value)| !(value.is_finite() && *value > 0.0)) else {
-        return Ok(());
-    };
-    Err(FeatureError::Config {
-        key,
-        value,
-        expected: "a positive number",
-    })
+    let settings = [
+        (
+            "contact_threshold",
+            config.contact_threshold,
+            f64::MAX,
+            "a positive number",
+        ),
+        (
+            "facing_sigma",
+            config.facing_sigma,
+            LONGEST_SIGMA,
+            "a number of frames above 0 and at most 10000",
+        ),
+    ];
+    match settings
+        .into_iter()
+        .find(|&(_, value, largest, _)| !(value > 0.0 && value <= largest))
+    {
+        Some((key, value, _, expected)) => Err(FeatureError::Config {
+            key,
+            value,
+            expected,
+        }),
+        None => Ok(()),
+    }
 }

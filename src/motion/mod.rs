@@ -2,15 +2,20 @@
 //!
 //! Units: centimetres, radians, seconds; Y is up. Computed in f64.
 
+pub mod bvh;
 pub mod clip;
 pub mod contact;
 pub mod facing;
 pub mod features;
+pub mod mapping;
 pub mod placement;
+pub mod resample;
 pub mod skeleton;
 pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
 pub use features::{FeatureConfig, FeatureError, features};
+pub use mapping::{Mapping, MappingError};
+pub use resample::{ResampleError, resample};
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
 pub use velocity_factor::{PART_WEIGHTS, PARTS, velocity_factors};

@@ -1,0 +1,40 @@
+//! `keydance features`: reads a BVH file, writes a .npy file.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use crate::data::{DanceClip, DataConfig};
+use crate::motion::{Mapping, bvh};
+
+#[derive(Debug, Args)]
+pub struct FeaturesArgs {
+    /// BVH file; brought to 30 frames a second
+    file: PathBuf,
+    /// Where to write the array: float32, [frames, 154], not standardised
+    #[arg(long, value_name = "FILE")]
+    npy: PathBuf,
+    /// Mapping file for a skeleton other than the dance skeleton
+    #[arg(long, value_name = "FILE")]
+    mapping: Option<PathBuf>,
+}
+
+/// # Errors
+/// A file cannot be read, or the clip does not go onto the dance skeleton; nothing is written then. The array cannot be written.
+pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
+    let mapping = args.mapping.as_deref().map(Mapping::read).transpose()?;
+    let clip = bvh::read(&args.file)?.to_clip();
+    let measured = DanceClip::new(clip, mapping.as_ref(), &DataConfig::default())?;
+    let array = measured.features.mapv(|value| value as f32);
+    ndarray_npy::write_npy(&args.npy, &array)
+        .with_context(|| format!("{} cannot be written", args.npy.display()))?;
+    let (frames, numbers) = array.dim();
+    writeln!(
+        std::io::stdout(),
+        "{}: float32 [{frames}, {numbers}]",
+        args.npy.display()
+    )?;
+    Ok(())
+}

@@ -1,0 +1,229 @@
+//! Which clips train, validate and test.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use super::config::{DataConfig, Split};
+use super::dataset::{DanceClip, DataError, Dataset};
+
+/// What the paper's split must hold: clips and frames for training, clips and frames for testing.
+const DANCE_TRAIN: (usize, usize) = (98, 93_347);
+const DANCE_TEST: (usize, usize) = (25, 20_879);
+
+/// Names of the files of each part.
+#[derive(Debug, PartialEq)]
+pub(super) struct Parts {
+    pub train: Vec<String>,
+    pub validation: Vec<String>,
+    pub test: Vec<String>,
+}
+
+/// Splits the files of a folder, given by name and sorted bytewise.
+pub(super) fn split(
+    names: &[String],
+    folder: &Path,
+    config: &DataConfig,
+) -> Result<Parts, DataError> {
+    let misfit = |config: String, found: String| DataError::Split {
+        config,
+        folder: folder.into(),
+        found,
+    };
+    if !(0.0..1.0).contains(&config.validation_share) {
+        let value = config.validation_share.to_string();
+        return Err(DataError::Config {
+            key: "validation_share",
+            value,
+            expected: "a share of at least 0 and below 1",
+        });
+    }
+    let (train, test) = match &config.split {
+        Split::Dance => {
+            let clips = DANCE_TRAIN.0 + DANCE_TEST.0;
+            if names.len() != clips {
+                let found = format!(
+                    "holds {}; for other data set data.split = {{ share = 0.8 }}",
+                    names.len()
+                );
+                return Err(misfit(
+                    format!("split = \"dance\", which has {clips} clips"),
+                    found,
+                ));
+            }
+            cut(names, DANCE_TRAIN.0)
+        }
+        Split::Share(share) => {
+            if !(*share > 0.0 && *share < 1.0) {
+                let value = share.to_string();
+                return Err(DataError::Config {
+                    key: "split.share",
+                    value,
+                    expected: "a share above 0 and below 1",
+                });
+            }
+            let count = floor(names.len() as f64 * share);
+            if count == 0 {
+                let found = format!("holds {}, which leaves none for training", names.len());
+                return Err(misfit(format!("split = {{ share = {share} }}"), found));
+            }
+            cut(names, count)
+        }
+        Split::List { train, test } => {
+            let mut seen = HashSet::new();
+            for name in train.iter().chain(test) {
+                if !seen.insert(name) {
+                    let expected = "file names that are each in one list, once";
+                    return Err(DataError::Config {
+                        key: "split.list",
+                        value: name.clone(),
+                        expected,
+                    });
+                }
+                if !names.contains(name) {
+                    let found = format!("does not have it among its {} clips", names.len());
+                    return Err(misfit(format!("that {name} is in the split"), found));
+                }
+            }
+            (train.clone(), test.clone())
+        }
+    };
+    let (train, validation) = set_aside(train, config.validation_share);
+    Ok(Parts {
+        train,
+        validation,
+        test,
+    })
+}
+
+/// The rule that gives the paper's training frames: number the sorted names from 1, sort `"{number}_{name}"` bytewise, the first `count` train.
+fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
+    let mut numbered: Vec<(String, &String)> = names
+        .iter()
+        .enumerate()
+        .map(|(index, name)| (format!("{}_{name}", index + 1), name))
+        .collect();
+    numbered.sort_unstable();
+    let mut train: Vec<String> = numbered.into_iter().map(|(_, name)| name.clone()).collect();
+    let test = train.split_off(count);
+    (train, test)
+}
+
+/// Takes a share of the training clips for validation, evenly spread over them: neighbours are often the same dancer's.
+fn set_aside(clips: Vec<String>, share: f64) -> (Vec<String>, Vec<String>) {
+    let (validation, train): (Vec<_>, Vec<_>) = clips
+        .into_iter()
+        .enumerate()
+        .partition(|(index, _)| floor((index + 1) as f64 * share) > floor(*index as f64 * share));
+    let names = |part: Vec<(usize, String)>| part.into_iter().map(|(_, name)| name).collect();
+    (names(train), names(validation))
+}
+
+/// Rounds down, but forgives what a share such as 0.29 lacks in binary.
+fn floor(number: f64) -> usize {
+    (number + 1e-9).floor() as usize
+}
+
+/// Checks the frame counts of the paper's split.
+pub(super) fn check_dance_frames(
+    dataset: &Dataset,
+    folder: &Path,
+    config: &DataConfig,
+) -> Result<(), DataError> {
+    let frames = |clips: &[DanceClip]| clips.iter().map(DanceClip::frames).sum::<usize>();
+    let found = (
+        frames(&dataset.train) + frames(&dataset.validation),
+        frames(&dataset.test),
+    );
+    let expected = (DANCE_TRAIN.1, DANCE_TEST.1);
+    if config.split == Split::Dance && found != expected {
+        return Err(DataError::Split {
+            config: format!(
+                "split = \"dance\" at {} fps, which has {} training and {} test frames",
+                config.fps, expected.0, expected.1
+            ),
+            folder: folder.into(),
+            found: format!(
+                "gives {} and {}; for other data set data.split = {{ share = 0.8 }}",
+                found.0, found.1
+            ),
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(count: usize) -> Vec<String> {
+        (0..count)
+            .map(|index| format!("{}.bvh", char::from(b'a' + index as u8)))
+            .collect()
+    }
+
+    #[test]
+    fn clips_are_split_by_their_number_as_text() {
+        let config = DataConfig {
+            split: Split::Share(0.25),
+            ..DataConfig::default()
+        };
+        let parts = split(&names(12), Path::new("x"), &config).unwrap();
+        assert_eq!(parts.train, ["j.bvh", "k.bvh", "l.bvh"]);
+        assert_eq!(parts.test[..2], ["a.bvh", "b.bvh"]);
+    }
+
+    #[test]
+    fn validation_clips_are_taken_from_the_training_clips_only() {
+        let plain = DataConfig {
+            split: Split::Share(0.5),
+            ..DataConfig::default()
+        };
+        let without = split(&names(20), Path::new("x"), &plain).unwrap();
+        let with = split(
+            &names(20),
+            Path::new("x"),
+            &DataConfig {
+                validation_share: 0.3,
+                ..plain
+            },
+        )
+        .unwrap();
+        assert_eq!(with.test, without.test);
+        assert_eq!(with.validation.len(), 3);
+        let mut rejoined = [with.train, with.validation].concat();
+        rejoined.sort_unstable();
+        let mut train = without.train;
+        train.sort_unstable();
+        assert_eq!(rejoined, train);
+    }
+
+    #[test]
+    fn a_split_that_does_not_fit_names_both_sides() {
+        let message = |split_by: Split, count: usize| {
+            let config = DataConfig {
+                split: split_by,
+                ..DataConfig::default()
+            };
+            split(&names(count), Path::new("folder"), &config)
+                .unwrap_err()
+                .to_string()
+        };
+        let text = message(Split::Dance, 4);
+        assert!(
+            text.contains("123 clips") && text.contains("folder holds 4"),
+            "{text}"
+        );
+        let list = |train: &str, test: &str| Split::List {
+            train: vec![train.into()],
+            test: vec![test.into()],
+        };
+        let text = message(list("a.bvh", "z.bvh"), 4);
+        assert!(
+            text.contains("z.bvh") && text.contains("its 4 clips"),
+            "{text}"
+        );
+        assert!(message(list("a.bvh", "a.bvh"), 4).contains("a.bvh"));
+        assert!(message(Split::Share(0.5), 1).contains("none for training"));
+        assert!(message(Split::Share(f64::NAN), 4).contains("split.share"));
+    }
+}

@@ -1,0 +1,66 @@
+//! From a file's bytes to a document.
+
+use std::path::Path;
+
+use super::document::{Bvh, JOINTS_PER_CHANNEL};
+use super::error::BvhError;
+use super::hierarchy::hierarchy;
+use super::rows::motion;
+use super::scanner::Scanner;
+
+/// Reads a BVH file. The document takes the file's name.
+///
+/// # Errors
+/// The file cannot be read, or it is not BVH: the error names file, line and what was expected.
+pub fn read(path: &Path) -> Result<Bvh, BvhError> {
+    let bytes = std::fs::read(path).map_err(|source| BvhError::Read {
+        path: path.into(),
+        source,
+    })?;
+    let mut document = parse(&bytes, &path.display().to_string())?;
+    if let Some(name) = path.file_name() {
+        document.name = name.to_string_lossy().into_owned();
+    }
+    Ok(document)
+}
+
+/// Reads a BVH document from the bytes of a file named `name`.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(bytes: &[u8], name: &str) -> Result<Bvh, BvhError> {
+    let text = text(bytes, name)?;
+    let mut scanner = Scanner::new(name, text);
+    let (skeleton, channels) = hierarchy(&mut scanner)?;
+    let total: usize = channels.iter().map(Vec::len).sum();
+    if total * JOINTS_PER_CHANNEL < skeleton.len() {
+        let expected = format!("at least one channel for every {JOINTS_PER_CHANNEL} joints");
+        return Err(scanner.error(
+            expected,
+            format!("{total} channels for {} joints", skeleton.len()),
+        ));
+    }
+    let (frame_time, motion) = motion(&mut scanner, total)?;
+    Ok(Bvh {
+        name: name.into(),
+        skeleton,
+        channels,
+        frame_time,
+        motion,
+    })
+}
+
+fn text<'a>(bytes: &'a [u8], name: &str) -> Result<&'a str, BvhError> {
+    std::str::from_utf8(bytes).map_err(|error| {
+        let valid = &bytes[..error.valid_up_to()];
+        BvhError::Syntax {
+            file: name.into(),
+            line: 1 + valid.iter().filter(|&&byte| byte == b'\n').count(),
+            expected: "text in UTF-8".into(),
+            found: format!(
+                "the byte {:#04x}",
+                bytes.get(valid.len()).copied().unwrap_or_default()
+            ),
+        }
+    })
+}

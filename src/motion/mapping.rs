@@ -1,0 +1,336 @@
+//! Mapping files: which joints of another skeleton stand for the 24 of the dance skeleton.
+//!
+//! ```toml
+//! scale = 2.54                                            # cm per unit of the file; 1 where left out
+//! [joints]
+//! Hips = "hip"                                            # a joint
+//! LeftToeBase = "lFoot/End Site"                          # an End Site of a joint; the second is "lFoot/End Site 2"
+//! Spine1 = { between = ["abdomen", "chest"], at = 0.5 }   # a point on the way from one to another
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+use thiserror::Error;
+
+use super::clip::{Clip, Pose};
+use super::skeleton::{DANCE_JOINTS, DANCE_PARENTS, Joint, Skeleton};
+
+/// Why a mapping cannot be used.
+#[derive(Debug, Error)]
+pub enum MappingError {
+    #[error("{path} cannot be read")]
+    Read {
+        path: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
+    #[error("{file} is not a mapping file")]
+    Syntax {
+        file: String,
+        #[source]
+        source: Box<toml::de::Error>,
+    },
+    #[error("{file}: [joints] names {joint}, which is not a joint of the dance skeleton ({})", DANCE_JOINTS.join(", "))]
+    UnknownJoint { file: String, joint: String },
+    #[error("{file}: [joints] lacks {joints}; all 24 joints of the dance skeleton need an entry")]
+    Incomplete { file: String, joints: String },
+    #[error("{file}: {key} = {value}: expected {expected}")]
+    Value {
+        file: String,
+        key: String,
+        value: f64,
+        expected: &'static str,
+    },
+    #[error(
+        "{file}: {joint} is mapped to {source_name:?}, which {clip} does not have ({available})"
+    )]
+    NotInClip {
+        file: String,
+        joint: String,
+        source_name: String,
+        clip: String,
+        available: String,
+    },
+}
+
+/// Where each of the 24 joints lies on another skeleton.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mapping {
+    /// Name of the file, for errors.
+    file: String,
+    /// cm per unit of the other skeleton.
+    scale: f64,
+    /// In the order of the dance skeleton, `[24]`.
+    sources: Vec<Source>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MappingFile {
+    #[serde(default = "one")]
+    scale: f64,
+    joints: BTreeMap<String, Source>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What stands for a joint.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a joint's name in quotes, or { between = [name, name], at = share }"
+)]
+enum Source {
+    At(String),
+    Between(Between),
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Between {
+    between: [String; 2],
+    at: f64,
+}
+
+/// A place on a skeleton that moves with one of its joints.
+#[derive(Clone, Copy)]
+struct Anchor {
+    joint: usize,
+    /// In the joint's frame.
+    offset: DVec3,
+}
+
+/// A source whose names have been found.
+enum Place {
+    At(Anchor),
+    Between(Anchor, Anchor, f64),
+}
+
+impl Mapping {
+    /// Reads a mapping file.
+    ///
+    /// # Errors
+    /// The file cannot be read; it has unknown keys, joints that the dance skeleton lacks, or lacks one of its joints.
+    pub fn read(path: &Path) -> Result<Self, MappingError> {
+        let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read {
+            path: path.into(),
+            source,
+        })?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads the text of a mapping file; `file` names it in errors.
+    ///
+    /// # Errors
+    /// As [`Mapping::read`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, MappingError> {
+        let parsed: MappingFile = toml::from_str(text).map_err(|source| MappingError::Syntax {
+            file: file.into(),
+            source: Box::new(source),
+        })?;
+        let MappingFile { scale, mut joints } = parsed;
+        if !(scale.is_finite() && scale > 0.0) {
+            let expected = "a positive number of cm";
+            return Err(MappingError::Value {
+                file: file.into(),
+                key: "scale".into(),
+                value: scale,
+                expected,
+            });
+        }
+        for (joint, source) in &joints {
+            if let Source::Between(Between { at, .. }) = source
+                && !(0.0..=1.0).contains(at)
+            {
+                let expected = "a share between 0 and 1";
+                return Err(MappingError::Value {
+                    file: file.into(),
+                    key: format!("{joint}.at"),
+                    value: *at,
+                    expected,
+                });
+            }
+        }
+        let found: Vec<Option<Source>> = DANCE_JOINTS
+            .iter()
+            .map(|name| joints.remove(*name))
+            .collect();
+        if let Some((joint, _)) = joints.pop_first() {
+            return Err(MappingError::UnknownJoint {
+                file: file.into(),
+                joint,
+            });
+        }
+        let lacking: Vec<&str> = DANCE_JOINTS
+            .iter()
+            .zip(&found)
+            .filter(|(_, source)| source.is_none())
+            .map(|(name, _)| *name)
+            .collect();
+        if !lacking.is_empty() {
+            return Err(MappingError::Incomplete {
+                file: file.into(),
+                joints: lacking.join(", "),
+            });
+        }
+        Ok(Self {
+            file: file.into(),
+            scale,
+            sources: found.into_iter().flatten().collect(),
+        })
+    }
+
+    /// The clip on the dance skeleton, in cm.
+    ///
+    /// Every joint has the world position and world rotation of what stands for it, in every frame; so a point between two joints moves in its
+    /// parent's frame, and the skeleton's offsets are those of the rest pose only.
+    ///
+    /// # Errors
+    /// The clip lacks a joint or End Site that the mapping names.
+    pub fn apply(&self, clip: &Clip) -> Result<Clip, MappingError> {
+        let places: Vec<Place> = self
+            .sources
+            .iter()
+            .zip(DANCE_JOINTS)
+            .map(|(source, joint)| self.place(source, joint, clip))
+            .collect::<Result<_, _>>()?;
+        let rest = Pose {
+            translations: clip
+                .skeleton
+                .joints
+                .iter()
+                .map(|joint| joint.offset)
+                .collect(),
+            rotations: vec![DQuat::IDENTITY; clip.skeleton.len()],
+        };
+        let offsets = self.pose(&places, &rest, &clip.skeleton).translations;
+        let joints = (0..DANCE_JOINTS.len())
+            .map(|index| Joint {
+                name: DANCE_JOINTS[index].into(),
+                parent: DANCE_PARENTS[index],
+                offset: offsets[index],
+                end_sites: self.end_sites(index, &places[index], &clip.skeleton),
+            })
+            .collect();
+        Ok(Clip {
+            name: clip.name.clone(),
+            skeleton: Skeleton { joints },
+            frame_time: clip.frame_time,
+            poses: clip
+                .poses
+                .iter()
+                .map(|pose| self.pose(&places, pose, &clip.skeleton))
+                .collect(),
+        })
+    }
+
+    fn place(&self, source: &Source, joint: &str, clip: &Clip) -> Result<Place, MappingError> {
+        let anchor = |name: &String| {
+            anchor(&clip.skeleton, name).ok_or_else(|| MappingError::NotInClip {
+                file: self.file.clone(),
+                joint: joint.into(),
+                source_name: name.clone(),
+                clip: clip.name.clone(),
+                available: clip
+                    .skeleton
+                    .joints
+                    .iter()
+                    .map(|joint| joint.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })
+        };
+        Ok(match source {
+            Source::At(name) => Place::At(anchor(name)?),
+            Source::Between(Between {
+                between: [from, to],
+                at,
+            }) => Place::Between(anchor(from)?, anchor(to)?, *at),
+        })
+    }
+
+    /// One frame's local transforms on the dance skeleton.
+    fn pose(&self, places: &[Place], pose: &Pose, skeleton: &Skeleton) -> Pose {
+        let (positions, rotations) = pose.world(skeleton);
+        let at = |anchor: &Anchor| {
+            let rotation = rotations[anchor.joint];
+            (
+                (positions[anchor.joint] + rotation * anchor.offset) * self.scale,
+                rotation,
+            )
+        };
+        let world: Vec<(DVec3, DQuat)> = places
+            .iter()
+            .map(|place| match place {
+                Place::At(anchor) => at(anchor),
+                Place::Between(from, to, share) => {
+                    let ((from, turned_from), (to, turned_to)) = (at(from), at(to));
+                    (
+                        from.lerp(to, *share),
+                        turned_from.slerp(turned_to, *share).normalize(),
+                    )
+                }
+            })
+            .collect();
+        let local = world
+            .iter()
+            .zip(DANCE_PARENTS)
+            .map(|(&(position, rotation), parent)| match parent {
+                None => (position, rotation),
+                Some(parent) => {
+                    let (origin, turned) = world[parent];
+                    let back = turned.inverse();
+                    (back * (position - origin), (back * rotation).normalize())
+                }
+            });
+        let (translations, rotations) = local.unzip();
+        Pose {
+            translations,
+            rotations,
+        }
+    }
+
+    /// End Sites of a joint that ends a limb: those of the joint that stands for it, or one at the joint itself.
+    fn end_sites(&self, joint: usize, place: &Place, skeleton: &Skeleton) -> Vec<DVec3> {
+        if DANCE_PARENTS.contains(&Some(joint)) {
+            return Vec::new();
+        }
+        let ends = match place {
+            Place::At(anchor) if anchor.offset == DVec3::ZERO => {
+                skeleton.joints[anchor.joint].end_sites.as_slice()
+            }
+            _ => &[],
+        };
+        if ends.is_empty() {
+            vec![DVec3::ZERO]
+        } else {
+            ends.iter().map(|end| *end * self.scale).collect()
+        }
+    }
+}
+
+/// Finds `joint`, `joint/End Site` or `joint/End Site 2`.
+fn anchor(skeleton: &Skeleton, name: &str) -> Option<Anchor> {
+    if let Some(joint) = skeleton.index_of(name) {
+        return Some(Anchor {
+            joint,
+            offset: DVec3::ZERO,
+        });
+    }
+    let (joint, end) = name.rsplit_once("/End Site")?;
+    let number = if end.is_empty() {
+        1
+    } else {
+        end.strip_prefix(' ')?.parse::<usize>().ok()?
+    };
+    let joint = skeleton.index_of(joint)?;
+    let offset = *skeleton.joints[joint]
+        .end_sites
+        .get(number.checked_sub(1)?)?;
+    Some(Anchor { joint, offset })
+}
