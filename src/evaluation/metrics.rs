@@ -1,0 +1,111 @@
+//! The measurements of one window behind LRP, AVF and ART (section 4.2, eq. 12 to 16).
+
+use std::ops::Range;
+
+use ndarray::{ArrayView2, s};
+
+use crate::models::{ModelError, Transition};
+use crate::motion::features::{BODY_POSITIONS, FACING, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::{PARTS, velocity_factors};
+
+/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by side in a frame.
+const POSITIONS: Range<usize> = BODY_POSITIONS.start..FACING.start;
+
+/// How far one predicted window is from the recorded one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowScores {
+    /// The window's term of eq. 12: mean over frames of `||p~^b - p^b||_2`, the norm of the 69-number difference, cm.
+    pub body_position: f64,
+    /// g_v, eq. 14: mean over frames and body parts of `|f~ - f^|`, cm/frame. f~ comes from the predicted positions.
+    pub velocity_factor: f64,
+    /// g_r, eq. 16: mean over frames of `||p~^r - p^^r||_2`, cm.
+    pub root: f64,
+}
+
+/// Measures a prediction against the recorded window.
+///
+/// `recorded`: `[N + 1, 154]`, frames k1 to k2, not standardised; its root positions and velocity factors are the ones that
+/// were asked for (p^^r and f^). `predicted`: N frames, k1 + 1 to k2. The velocity factors f~ (eq. 1) are those of the differences of
+/// predicted positions, p^b and p^r, from frame to frame; the frame before k1 + 1 is the recorded k1. The predicted
+/// velocities are not looked at.
+///
+/// # Errors
+///
+/// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two do not fit together.
+pub fn window_scores(
+    recorded: ArrayView2<f64>,
+    predicted: &Transition,
+) -> Result<WindowScores, ModelError> {
+    let (rows, columns) = recorded.dim();
+    if rows < 2 {
+        return Err(ModelError::NoFrames { rows });
+    }
+    if columns != FEATURES {
+        return Err(ModelError::Shape {
+            what: "recorded window".into(),
+            expected: vec![rows, FEATURES],
+            found: vec![rows, columns],
+        });
+    }
+    let length = rows - 1;
+    predicted.check(length)?;
+
+    let mut sums = WindowScores {
+        body_position: 0.0,
+        velocity_factor: 0.0,
+        root: 0.0,
+    };
+    let mut before = recorded.row(0);
+    for (truth, frame) in recorded
+        .rows()
+        .into_iter()
+        .skip(1)
+        .zip(predicted.frames.rows())
+    {
+        let distance = |range: Range<usize>| {
+            range
+                .map(|column| (frame[column] - truth[column]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
+        let velocities = std::array::from_fn(|number| {
+            let column = POSITIONS.start + number;
+            frame[column] - before[column]
+        });
+        let factor_error: f64 = velocity_factors(&velocities)
+            .iter()
+            .zip(truth.slice(s![VELOCITY_FACTORS]))
+            .map(|(predicted, wanted)| (predicted - wanted).abs())
+            .sum();
+        sums.body_position += distance(BODY_POSITIONS);
+        sums.velocity_factor += factor_error / PARTS as f64;
+        sums.root += distance(ROOT_POSITION);
+        before = frame;
+    }
+    let frames = length as f64;
+    Ok(WindowScores {
+        body_position: sums.body_position / frames,
+        velocity_factor: sums.velocity_factor / frames,
+        root: sums.root / frames,
+    })
+}
+
+/// Means over the windows of one length: LRP (cm, eq. 12), AVF (share, eq. 13) and ART (share, eq. 15), in this order.
+///
+/// A window counts for AVF where g_v is strictly below `delta_v` (cm/frame), for ART where g_r is strictly below `delta_r` (cm).
+/// No windows give NaN.
+pub fn means(windows: &[WindowScores], delta_v: f64, delta_r: f64) -> [f64; 3] {
+    let count = windows.len() as f64;
+    let share = |hit: &dyn Fn(&WindowScores) -> bool| {
+        windows.iter().filter(|window| hit(window)).count() as f64 / count
+    };
+    [
+        windows
+            .iter()
+            .map(|window| window.body_position)
+            .sum::<f64>()
+            / count,
+        share(&|window| window.velocity_factor < delta_v),
+        share(&|window| window.root < delta_r),
+    ]
+}

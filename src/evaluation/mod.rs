@@ -1,0 +1,14 @@
+//! Evaluation: the paper's three scores of a model, by a frozen protocol, and the tables that set them beside the paper's.
+
+pub mod metrics;
+pub mod paper;
+pub mod protocol;
+pub mod scores;
+pub mod tables;
+pub mod window_request;
+
+pub use metrics::{WindowScores, window_scores};
+pub use protocol::{EvaluationError, Outcome, Protocol, SkippedClip};
+pub use scores::{Evaluation, LengthScores};
+pub use tables::{TableRow, markdown_tables, terminal_tables};
+pub use window_request::window_request;

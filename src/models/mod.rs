@@ -1,0 +1,10 @@
+//! Models that fill the frames between two keyframes, behind one trait: [`TransitionModel`].
+//!
+//! Evaluation and synthesis know a model by this trait only, training by [`Network`].
+
+pub mod interpolation;
+pub mod network;
+pub mod transition;
+
+pub use network::{Batch, Feed, LossTerms, Network};
+pub use transition::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};

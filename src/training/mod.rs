@@ -1,0 +1,1 @@
+//! Training: curriculum, scheduled sampling, the loop, checkpoints.
