@@ -1,0 +1,60 @@
+//! The models by their name in a config: the one place that names them all.
+
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+use super::interpolation::Interpolation;
+use super::pan2021::{Pan2021, Pan2021Config};
+use super::{ModelError, Network, TransitionModel};
+use crate::autograd::Real;
+use crate::data::Standardisation;
+use crate::nn::Initialiser;
+
+/// The `[model]` table of an experiment's config; `kind` says which.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ModelConfig {
+    /// Pan et al. 2021, and its ablations.
+    Pan2021(Pan2021Config),
+    /// Slerp between the keyframes; nothing to train.
+    Interpolation(NoSettings),
+}
+
+/// A table without keys.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoSettings {}
+
+impl Default for ModelConfig {
+    fn default() -> Self {
+        Self::Pan2021(Pan2021Config::default())
+    }
+}
+
+impl ModelConfig {
+    /// The network to train, its weights added through `init`.
+    ///
+    /// # Errors
+    /// A model that is not trained; settings that do not fit together.
+    pub fn build<T: Real, R: Rng>(
+        &self,
+        init: &mut Initialiser<'_, T, R>,
+        standardisation: &Standardisation,
+    ) -> Result<Box<dyn Network<T>>, ModelError> {
+        match self {
+            Self::Pan2021(config) => Ok(Box::new(Pan2021::new(init, config, standardisation)?)),
+            Self::Interpolation(_) => Err(ModelError::Model {
+                model: "interpolation".into(),
+                reason: "has no weights and needs no training; evaluate its config as it is".into(),
+            }),
+        }
+    }
+
+    /// The model, where it needs no training.
+    pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn TransitionModel>> {
+        match self {
+            Self::Interpolation(_) => Some(Box::new(Interpolation { contact_threshold })),
+            Self::Pan2021(_) => None,
+        }
+    }
+}
