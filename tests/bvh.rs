@@ -135,7 +135,20 @@ fn inspect_prints_what_the_file_holds() {
         .arg(&path)
         .assert()
         .success();
-    insta::assert_snapshot!(String::from_utf8_lossy(&run.get_output().stdout), @r"");
+    insta::assert_snapshot!(String::from_utf8_lossy(&run.get_output().stdout), @r"
+    two.bvh
+    frames       2
+    frame time   0.00833333 s (120.000 fps)
+    duration     0.017 s
+    joints       2 and 2 End Sites
+    channels     10
+    root height  0.000 to 20.000
+    hierarchy
+      Hips  offset 1 2 3  [Xposition Yposition Zposition Zrotation Xrotation Yrotation]
+        Left Arm  offset 1 0 0  [Yrotation Yposition Xrotation Zrotation]
+          End Site  offset 0 1 0
+          End Site  offset 0 2 0
+    ");
 }
 
 #[test]
