@@ -3,6 +3,7 @@
 //! Units: centimetres, radians, seconds; Y is up. Computed in f64.
 
 pub mod clip;
+pub mod ik;
 pub mod skeleton;
 
 pub use clip::{Clip, Pose};
