@@ -1,10 +1,10 @@
 //! From the score to local rotations: legs by inverse kinematics, trunk, head and arms from their curves.
 
-use glam::{DQuat, DVec3, EulerRot};
+use glam::{DQuat, DVec2, DVec3, EulerRot};
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
-use super::body::{ARMS, HEAD, HIPS, LEGS, NECK, SHIN, SPINE, SPINE_JOINTS, THIGH};
+use super::body::{ARMS, HEAD, HIPS, LEGS, NECK, SHIN, SPINE, SPINE_JOINTS, STANDING, THIGH};
 use super::curve::smooth;
 use super::feet::FootPose;
 use super::pelvis::{Pelvis, STRETCH};
@@ -16,7 +16,11 @@ use crate::motion::{Pose, Skeleton};
 /// Share of a bend of the spine that each of its joints takes, from below.
 const SPINE_SHARES: [f64; SPINE_JOINTS] = [0.14, 0.2, 0.22, 0.24, 0.2];
 /// Farthest stretch of a swinging leg, as a share of its length.
-const SWING_STRETCH: f64 = 0.998;
+const SWING_STRETCH: f64 = 0.999;
+/// How far an arm swings forward (degrees) for each cm that the opposite foot is ahead.
+const STRIDE_SWING: f64 = 0.35;
+/// How far the arms rise (degrees) for each cm that the pelvis does.
+const RISE_LIFT: f64 = 1.4;
 /// Frames by which the eyes are ahead of a turn.
 const GAZE: usize = 9;
 
@@ -58,7 +62,7 @@ pub fn poses(
     rng: &mut ChaCha12Rng,
 ) -> Vec<Pose> {
     let frames = pelvis.len();
-    let spine = smooth(&score.spine.sample(frames), 3.0);
+    let spine = smooth(&score.spine.sample(frames), 2.5);
     let head = smooth(&score.head.sample(frames), 3.0);
     let flow = 1.2 + 0.05 * score.rhythm.beat();
     let arms = [0, 1].map(|arm| smooth(&score.arms[arm].sample(frames), flow));
@@ -67,6 +71,7 @@ pub fn poses(
     let turning: Vec<f64> = (0..frames)
         .map(|frame| pelvis[(frame + GAZE).min(frames - 1)].yaw - pelvis[frame].yaw)
         .collect();
+    let carried = carried(score, feet, pelvis);
     (0..frames)
         .map(|frame| {
             let here = &pelvis[frame];
@@ -99,11 +104,15 @@ pub fn poses(
             for (joint, share) in [(NECK, 0.45), (HEAD, 0.55)] {
                 rotations[joint] = bent(share * nod, share * left, share * turn);
             }
+            let [stride, rise] = carried[frame];
             for (arm, side) in [(0, 1.0), (1, -1.0)] {
                 let mut values = arms[arm][frame];
                 for (k, value) in values.iter_mut().enumerate() {
                     *value += arm_drift[arm].at(frame, k);
                 }
+                values[0] += side * (14.0 * ahead - STRIDE_SWING * stride);
+                values[1] += 10.0 * ahead.abs() + RISE_LIFT * rise;
+                values[3] += 0.5 * RISE_LIFT * rise.abs();
                 rotations[ARMS[arm]..ARMS[arm] + 4]
                     .copy_from_slice(&arm_pose(values).rotations(side));
             }
@@ -113,6 +122,23 @@ pub fn poses(
             }
         })
         .collect()
+}
+
+/// What carries the arms along: how far the left foot is ahead of the right (cm), and how far the pelvis is above its usual
+/// height (cm), in every frame.
+fn carried(score: &Score, feet: &[Vec<FootPose>; 2], pelvis: &[Pelvis]) -> Vec<[f64; 2]> {
+    let usual = STANDING - score.style.bend - 0.3 * score.style.depth;
+    let raw: Vec<[f64; 2]> = pelvis
+        .iter()
+        .enumerate()
+        .map(|(frame, pelvis)| {
+            let apart = feet[0][frame].ball - feet[1][frame].ball;
+            let stride = DVec2::new(apart.x, apart.z).dot(Score::floor(pelvis.yaw, 1.0, 0.0));
+            let rise = pelvis.position.y - usual;
+            [60.0 * (stride / 60.0).tanh(), 15.0 * (rise / 15.0).tanh()]
+        })
+        .collect();
+    smooth(&raw, 2.5)
 }
 
 /// A bend forward, to the left and a turn to the left, in degrees.

@@ -13,7 +13,7 @@ const SHORTEST_SWING: f64 = 5.0;
 /// Frames that a heel takes to come down after the ball has landed.
 const SETTLE: f64 = 3.0;
 /// Least mean speed (cm/frame) of a heel that rises, lowers or turns, and of a foot that steps: a slow dancer waits, then moves.
-const BRISK: f64 = 0.95;
+const BRISK: f64 = 1.05;
 /// Smallest turn (rad) worth a pivot.
 const SMALLEST_PIVOT: f64 = 0.15;
 /// Changes of a foot's pose over a frame below this (cm, rad) are none.
@@ -233,7 +233,7 @@ impl FootPlan {
     ) -> f64 {
         let stance = self.last_mut();
         let travel = stance.ball.distance(placement.ball) + 2.0 * swing.lift;
-        let longest = if swing.vias.is_empty() {
+        let longest = if swing.vias.is_empty() && off.is_none() {
             (travel / BRISK).ceil()
         } else {
             f64::INFINITY

@@ -1,9 +1,9 @@
 //! The built-in choreography: human dance motion on the dance skeleton, from a seed.
 //!
 //! For whoever has no motion capture. A clip is made in layers, each a file, in this order:
-//! [`style`] (what kind of dance) and [`rhythm`] (beats to frames); [`figures`] write a [`score`]: what feet, pelvis, trunk,
-//! head and arms do when; [`feet`] turns it into planted and swinging feet and the true contacts; [`pelvis`] finds
-//! the path of the pelvis within the legs' reach; [`assembly`] finds the rotations, the legs' by inverse kinematics.
+//! `style` (what kind of dance) and `rhythm` (beats to frames); `figures` write a `score`: what feet, pelvis, trunk,
+//! head and arms do when; `feet` turns it into planted and swinging feet and the true contacts; `pelvis` finds
+//! the path of the pelvis within the legs' reach; `assembly` finds the rotations, the legs' by inverse kinematics.
 
 mod assembly;
 mod body;
@@ -35,7 +35,7 @@ const FEWEST_FRAMES: usize = 2;
 const MOST_FRAMES: usize = 1_000_000;
 
 /// Distance (cm) from the middle of the floor at which a dancer turns back.
-const FARTHEST: f64 = 110.0;
+const FARTHEST: f64 = 120.0;
 
 /// What to generate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

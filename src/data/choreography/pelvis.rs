@@ -10,7 +10,7 @@ use super::score::{Jump, Score};
 /// Gravity, cm/frame^2 at 30 frames a second.
 const GRAVITY: f64 = 981.0 / 900.0;
 /// Share of the leg's length to which a planted leg stretches.
-pub const STRETCH: f64 = 0.988;
+pub const STRETCH: f64 = 0.993;
 /// Frames by which the limit of the height looks ahead and back; the smoothing's kernel reaches as far.
 const LOOK: usize = 6;
 /// Width (cm) over which the wished height gives way to the limit.
@@ -71,9 +71,12 @@ pub fn path(score: &Score, feet: &[Vec<FootPose>; 2]) -> Vec<Pelvis> {
             }
         })
         .collect();
-    let limits: Vec<f64> = (0..frames)
-        .map(|frame| limit(&pelvis[frame], [&feet[0][frame], &feet[1][frame]]))
-        .collect();
+    let limits_within = |near: f64, pelvis: &[Pelvis]| -> Vec<f64> {
+        (0..frames)
+            .map(|frame| limit(&pelvis[frame], [&feet[0][frame], &feet[1][frame]], near))
+            .collect()
+    };
+    let limits = limits_within(NEAR_FLOOR, &pelvis);
     let lowest: Vec<[f64; 1]> = (0..frames)
         .map(|frame| {
             let around = &limits[frame.saturating_sub(LOOK)..(frame + LOOK + 1).min(frames)];
@@ -85,8 +88,9 @@ pub fn path(score: &Score, feet: &[Vec<FootPose>; 2]) -> Vec<Pelvis> {
         // A soft minimum, never above either.
         pelvis.position.y = wish.min(limit) - BLEND * (-(wish - limit).abs() / BLEND).exp().ln_1p();
     }
+    let planted = limits_within(0.0, &pelvis);
     for jump in &score.jumps {
-        fly(jump, &limits, &mut pelvis);
+        fly(jump, &planted, &mut pelvis);
     }
     pelvis
 }
@@ -123,13 +127,14 @@ fn supports(score: &Score, feet: &[Vec<FootPose>; 2]) -> Vec<[f64; 2]> {
     smooth(&support, 2.0 + 0.1 * score.rhythm.beat())
 }
 
-/// The greatest height of the root at which the legs on or near the floor reach, cm; infinite with both in the air.
-fn limit(pelvis: &Pelvis, feet: [&FootPose; 2]) -> f64 {
+/// The greatest height of the root at which the legs reach whose feet are on the floor or are so within `near` frames, cm;
+/// infinite with both in the air.
+fn limit(pelvis: &Pelvis, feet: [&FootPose; 2], near: f64) -> f64 {
     let reach = STRETCH * (THIGH + SHIN);
     [1.0, -1.0]
         .iter()
         .zip(feet)
-        .filter(|(_, foot)| foot.from_floor <= NEAR_FLOOR)
+        .filter(|(_, foot)| foot.from_floor <= near)
         .map(|(side, foot)| {
             let (hip, ankle) = (pelvis.hip(*side), foot.ankle());
             let across = DVec2::new(hip.x - ankle.x, hip.z - ankle.z).length();
@@ -139,7 +144,8 @@ fn limit(pelvis: &Pelvis, feet: [&FootPose; 2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Replaces the height over one jump: crouch, stretch, ballistic flight, landing, recovery.
+/// Replaces the height over one jump: crouch, stretch, ballistic flight, landing, recovery, never above what the planted legs
+/// reach.
 fn fly(jump: &Jump, limits: &[f64], pelvis: &mut [Pelvis]) {
     let frames = pelvis.len();
     let height = |frame: f64| {
@@ -178,14 +184,16 @@ fn fly(jump: &Jump, limits: &[f64], pelvis: &mut [Pelvis]) {
     for pair in keys.windows(2) {
         let ((t0, y0, v0), (t1, y1, v1)) = (pair[0], pair[1]);
         let last = (t1 as usize).min(frames - 1);
-        for (frame, pelvis) in pelvis
+        for (frame, (pelvis, limit)) in pelvis
             .iter_mut()
+            .zip(limits)
             .enumerate()
             .take(last + 1)
             .skip(t0 as usize)
         {
             let u = (frame as f64 - t0) / (t1 - t0);
-            pelvis.position.y = hermite(u, y0, y1, v0 * (t1 - t0), v1 * (t1 - t0));
+            let height = hermite(u, y0, y1, v0 * (t1 - t0), v1 * (t1 - t0));
+            pelvis.position.y = height.min(*limit);
         }
     }
 }

@@ -9,6 +9,12 @@ use super::rhythm::Rhythm;
 use super::style::Style;
 use super::upper_body::{ArmPose, ArmTrack};
 
+/// Greatest distance between the balls of the feet, cm.
+const LONGEST_STRIDE: f64 = 82.0;
+
+/// How far the spine bends at most: forward or back, to a side, round (degrees).
+const MOST_BEND: [f64; 3] = [52.0, 34.0, 42.0];
+
 /// A jump, in frames.
 #[derive(Debug, Clone, Copy)]
 pub struct Jump {
@@ -122,6 +128,7 @@ impl Score {
     /// between the feet, half of the step's time later mostly on the landed foot.
     pub fn step(&mut self, foot: Foot, from: f64, to: f64, placement: Placement, swing: Swing) {
         let (start, end) = (self.frame(from), self.frame(to));
+        let placement = self.within_stride(foot, placement);
         let land = self.feet[foot.index()].swing(start, None, end, placement, swing);
         let stance = self.weight_on(foot.other(), 0.86);
         let arrived = self.weight_on(foot, 0.86);
@@ -130,6 +137,13 @@ impl Score {
         self.balance
             .key(land + 0.4 * (end - start).max(4.0), [arrived]);
         self.free = foot.other();
+    }
+
+    /// The placement, nearer to the other foot where it is farther away than a stride.
+    fn within_stride(&self, foot: Foot, placement: Placement) -> Placement {
+        let other = self.feet[foot.other().index()].placement().ball;
+        let ball = other + (placement.ball - other).clamp_length_max(LONGEST_STRIDE);
+        Placement { ball, ..placement }
     }
 
     /// The balance that puts the share `most` of the weight on `foot`.
@@ -153,17 +167,19 @@ impl Score {
         self.sink.key(frame, [depth]);
     }
 
-    /// Keys the spine at `beats` from here (degrees: forward, left, turn to the left), scaled by the style.
+    /// Keys the spine at `beats` from here (degrees: forward, left, turn to the left), scaled by the style and kept
+    /// within what a spine does.
     pub fn spine(&mut self, beats: f64, bend: [f64; 3]) {
         let frame = self.frame(beats);
-        let scale = self.style.trunk;
-        self.spine.key(frame, bend.map(|angle| scale * angle));
+        let scale = 2.5 * self.style.trunk;
+        let bend = std::array::from_fn(|k| MOST_BEND[k] * (scale * bend[k] / MOST_BEND[k]).tanh());
+        self.spine.key(frame, bend);
     }
 
     /// Keys the tilt of the pelvis at `beats` from here (degrees: forward, left), scaled by the style.
     pub fn tilt(&mut self, beats: f64, tilt: [f64; 2]) {
         let frame = self.frame(beats);
-        let scale = self.style.trunk;
+        let scale = 1.6 * self.style.trunk;
         self.pelvis.key(frame, tilt.map(|angle| scale * angle));
     }
 

@@ -45,11 +45,11 @@ const STYLES: [Style; 6] = [
         half_stance: 8.0,
         turnout: 0.2,
         step: 54.0,
-        bend: 3.0,
+        bend: 0.5,
         depth: 8.0,
         trunk: 0.8,
         arms: 0.9,
-        coupling: 0.85,
+        coupling: 0.93,
         families: [
             (Family::Steps, 4.0),
             (Family::Turns, 3.0),
@@ -66,11 +66,11 @@ const STYLES: [Style; 6] = [
         half_stance: 9.0,
         turnout: 0.3,
         step: 60.0,
-        bend: 3.5,
+        bend: 0.5,
         depth: 14.0,
         trunk: 1.2,
         arms: 1.0,
-        coupling: 0.75,
+        coupling: 0.88,
         families: [
             (Family::Steps, 4.0),
             (Family::Turns, 2.5),
@@ -87,11 +87,11 @@ const STYLES: [Style; 6] = [
         half_stance: 11.0,
         turnout: 0.15,
         step: 64.0,
-        bend: 6.0,
+        bend: 2.0,
         depth: 22.0,
         trunk: 1.5,
         arms: 1.0,
-        coupling: 0.65,
+        coupling: 0.82,
         families: [
             (Family::Steps, 4.0),
             (Family::Turns, 2.5),
@@ -108,11 +108,11 @@ const STYLES: [Style; 6] = [
         half_stance: 11.0,
         turnout: 0.1,
         step: 50.0,
-        bend: 5.0,
+        bend: 1.0,
         depth: 12.0,
         trunk: 1.0,
         arms: 1.0,
-        coupling: 0.8,
+        coupling: 0.90,
         families: [
             (Family::Steps, 4.0),
             (Family::Turns, 2.5),
@@ -129,11 +129,11 @@ const STYLES: [Style; 6] = [
         half_stance: 8.0,
         turnout: 0.12,
         step: 46.0,
-        bend: 3.0,
+        bend: 0.5,
         depth: 8.0,
         trunk: 0.6,
         arms: 0.85,
-        coupling: 0.9,
+        coupling: 0.95,
         families: [
             (Family::Steps, 4.0),
             (Family::Turns, 2.0),
@@ -150,11 +150,11 @@ const STYLES: [Style; 6] = [
         half_stance: 8.5,
         turnout: 0.35,
         step: 54.0,
-        bend: 2.5,
+        bend: 0.5,
         depth: 16.0,
         trunk: 1.1,
         arms: 1.0,
-        coupling: 0.7,
+        coupling: 0.85,
         families: [
             (Family::Steps, 3.0),
             (Family::Turns, 1.8),
@@ -170,7 +170,7 @@ impl Style {
     pub fn draw(number: usize, rng: &mut ChaCha12Rng) -> Self {
         let mut style = STYLES[number % STYLES.len()].clone();
         style.step *= rng.random_range(0.85..1.15);
-        style.bend += rng.random_range(-1.0..2.0);
+        style.bend += rng.random_range(-0.5..1.5);
         style.depth *= rng.random_range(0.8..1.25);
         style.trunk *= rng.random_range(0.8..1.25);
         style.arms *= rng.random_range(0.88..1.0);

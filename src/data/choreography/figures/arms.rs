@@ -41,6 +41,9 @@ enum ArmFigure {
     Waist,
 }
 
+/// Frames that one arm figure takes at most; longer cues get several, to alternate sides.
+const LONGEST: f64 = 44.0;
+
 /// Writes arms over the next `beats`: by the style's coupling those that belong to the cue, else drawn freely.
 pub fn accompany(score: &mut Score, beats: f64, cue: Cue, rng: &mut ChaCha12Rng) {
     let figure = if rng.random_bool(score.style.coupling) {
@@ -56,6 +59,18 @@ pub fn accompany(score: &mut Score, beats: f64, cue: Cue, rng: &mut ChaCha12Rng)
             _ => ArmFigure::Scoop,
         }
     };
+    let rounds = (beats * score.rhythm.beat() / LONGEST).round().max(1.0);
+    let (start, beats) = (score.beat, beats / rounds);
+    let mut cue = cue;
+    for round in 0..rounds as u32 {
+        score.beat = start + f64::from(round) * beats;
+        write(figure, score, beats, cue);
+        cue = mirrored(cue);
+    }
+    score.beat = start;
+}
+
+fn write(figure: ArmFigure, score: &mut Score, beats: f64, cue: Cue) {
     match figure {
         ArmFigure::Opposition => opposition(score, beats, cue),
         ArmFigure::PortDeBras => port_de_bras(score, beats, cue),
@@ -65,6 +80,30 @@ pub fn accompany(score: &mut Score, beats: f64, cue: Cue, rng: &mut ChaCha12Rng)
         ArmFigure::Gather => gather(score, beats, cue),
         ArmFigure::Scoop => scoop(score, beats),
         ArmFigure::Waist => waist(score, beats, cue),
+    }
+}
+
+/// The cue of the other side.
+fn mirrored(cue: Cue) -> Cue {
+    match cue {
+        Cue::Travel {
+            forward,
+            left,
+            step,
+            first,
+        } => Cue::Travel {
+            forward,
+            left: -left,
+            step,
+            first: -first,
+        },
+        Cue::Turn { side } => Cue::Turn { side: -side },
+        Cue::Sway { side, swing } => Cue::Sway { side: -side, swing },
+        Cue::Leg { side, forward } => Cue::Leg {
+            side: -side,
+            forward,
+        },
+        Cue::Rise | Cue::Bow => cue,
     }
 }
 
@@ -137,7 +176,13 @@ fn port_de_bras(score: &mut Score, beats: f64, cue: Cue) {
         }
         _ => pair(score, 0.62 * beats, side, ArmPose::HIGH, ArmPose::SECOND),
     }
-    score.arms(beats, ArmPose::SECOND, ArmPose::SECOND.moved(6.0, -12.0));
+    pair(
+        score,
+        beats,
+        side,
+        ArmPose::LOW,
+        ArmPose::SECOND.moved(6.0, -30.0),
+    );
 }
 
 /// A wave that runs from one arm to the other, following the weight.
@@ -200,7 +245,13 @@ fn reach(score: &mut Score, beats: f64, cue: Cue) {
         near.moved(-6.0, 4.0),
         far.moved(-4.0, 4.0),
     );
-    pair(score, beats, side, ArmPose::SECOND, ArmPose::LOW);
+    pair(
+        score,
+        beats,
+        side,
+        ArmPose::SECOND.moved(4.0, -35.0),
+        ArmPose::LOW,
+    );
 }
 
 /// Open, gather before the chest while turning, open again.

@@ -47,7 +47,7 @@ pub fn return_to_the_middle(score: &mut Score, rng: &mut ChaCha12Rng) {
 }
 
 /// Distance (cm) from the middle of the floor over which going on outwards becomes three times less likely.
-const ROOM: f64 = 60.0;
+const ROOM: f64 = 75.0;
 
 /// Draws one of the directions (forward, left: shares of `distance` cm), rather those that stay near the middle of the floor.
 fn draw_direction(

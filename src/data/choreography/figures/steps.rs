@@ -54,8 +54,8 @@ pub fn walk(score: &mut Score, rng: &mut ChaCha12Rng) {
             score.face(beat + 1.0, score.heading + bend);
         }
         let placement = score.home(foot, score.centre, score.heading, 0.0);
-        score.sink(beat + 0.5, 0.15 * score.style.depth);
-        score.sink(beat + 1.0, 0.35 * score.style.depth);
+        score.sink(beat + 0.5, 0.0);
+        score.sink(beat + 1.0, 0.2 * score.style.depth);
         score.spine(beat + 1.0, [4.0 * forward, -3.0 * left, 9.0 * foot.side()]);
         score.step(foot, beat, beat + 0.9, placement, Swing::step(7.0));
     }

@@ -93,7 +93,7 @@ fn bow(score: &mut Score, rng: &mut ChaCha12Rng) {
     let slow = if score.rhythm.beat() < 20.0 { 2.0 } else { 1.0 };
     let beats = 4.0 * slow;
     let side = draw_side(rng);
-    let deep = rng.random_range(24.0..42.0);
+    let deep = rng.random_range(14.0..26.0);
     accompany(score, beats, Cue::Bow, rng);
     score.balance.key(score.frame(0.8 * slow), [0.5]);
     score.sink(1.4 * slow, score.style.depth);
