@@ -83,7 +83,7 @@ fn offset(joint: usize) -> DVec3 {
 
 fn end_site(joint: usize) -> Option<DVec3> {
     match joint {
-        4 | 8 => Some(DVec3::new(0.0, -1.0, 6.0)),
+        4 | 8 => Some(DVec3::new(0.0, -0.5, 3.0)),
         17 => Some(DVec3::new(-15.0, 0.0, 0.0)),
         21 => Some(DVec3::new(15.0, 0.0, 0.0)),
         23 => Some(DVec3::new(0.0, 17.0, 1.0)),

@@ -45,7 +45,7 @@ pub struct ChoreographyConfig {
     pub clips: usize,
     /// Frames of each clip, at 30 a second.
     pub frames_per_clip: usize,
-    /// Everything follows from it. Clip n is the same however many clips are asked for.
+    /// Everything follows from it, to the bit on one platform. Clip n is the same however many clips are asked for.
     pub seed: u64,
 }
 

@@ -2,12 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
 use super::arms::{Cue, accompany};
 use super::draw_side;
+use crate::data::choreography::curve::ease;
 use crate::data::choreography::feet::{Swing, Via};
 use crate::data::choreography::score::Score;
 
@@ -129,7 +130,7 @@ fn pirouette(score: &mut Score, rng: &mut ChaCha12Rng) {
     score.heading = start + turn;
     // The middle of the base turns with the body about the standing foot.
     let offset = score.centre - score.home(stance, score.centre, start, 0.0).ball;
-    let turned = glam::DVec2::from_angle(-turn).rotate(offset);
+    let turned = DVec2::from_angle(-turn).rotate(offset);
     score.centre = spot.ball + turned;
     let raised = 28f64.to_radians();
     let foot = &mut score.feet[stance.index()];
@@ -139,7 +140,7 @@ fn pirouette(score: &mut Score, rng: &mut ChaCha12Rng) {
     let vias = (1..=5u8)
         .map(|i| {
             let at = f64::from(i) / 6.0;
-            let along = super::super::curve::ease((at * 1.3 - 0.15).clamp(0.0, 1.0));
+            let along = ease((at * 1.3 - 0.15).clamp(0.0, 1.0));
             let heading = start + along * turn;
             let height = 44.0 * (PI * at).sin().powf(0.7);
             let ball = spot.ball + Score::floor(heading, 9.0, 9.0 * lifted.side());
