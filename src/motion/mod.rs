@@ -8,6 +8,7 @@ pub mod contact;
 pub mod facing;
 pub mod features;
 pub mod fit;
+pub mod ik;
 pub mod mapping;
 pub mod placement;
 pub mod resample;
