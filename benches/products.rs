@@ -159,6 +159,12 @@ fn activations(criterion: &mut Criterion) {
             group.bench_function("packed", |bench| {
                 bench.iter(|| product_packed(left, &packed, MatMut::new(&mut c, m, n), false));
             });
+            if Isa::detected() == Isa::Avx512 {
+                let packed = Packed::new_for(Isa::Avx2, Mat::new(&b, k, n));
+                group.bench_function("packed, AVX2", |bench| {
+                    bench.iter(|| product_packed(left, &packed, MatMut::new(&mut c, m, n), false));
+                });
+            }
             group.bench_function("plain", |bench| {
                 let b = Mat::new(&b, k, n);
                 bench.iter(|| product(left, b, MatMut::new(&mut c, m, n), false));
@@ -225,25 +231,24 @@ fn functions(criterion: &mut Criterion) {
     let mut y = x.clone();
     let mut group = short(criterion, "functions");
     group.throughput(Throughput::Elements(x.len() as u64));
-    let vectorised: [(&str, fn(&mut [f32])); 3] = [
-        ("exp", f32::exp_slice),
-        ("tanh", f32::tanh_slice),
-        ("sigmoid", f32::sigmoid_slice),
-    ];
-    for (name, function) in vectorised {
+    let mut vectorised = |name: &str, function: fn(&mut [f32])| {
         group.bench_function(name, |bench| {
             bench.iter(|| {
                 y.copy_from_slice(&x);
                 function(black_box(&mut y));
             });
         });
-    }
-    let standard: [(&str, fn(f32) -> f32); 2] = [("std exp", f32::exp), ("std tanh", f32::tanh)];
-    for (name, function) in standard {
+    };
+    vectorised("exp", f32::exp_slice);
+    vectorised("tanh", f32::tanh_slice);
+    vectorised("sigmoid", f32::sigmoid_slice);
+    let mut standard = |name: &str, function: fn(f32) -> f32| {
         group.bench_function(name, |bench| {
             bench.iter(|| y.iter_mut().zip(&x).for_each(|(y, x)| *y = function(*x)));
         });
-    }
+    };
+    standard("std exp", f32::exp);
+    standard("std tanh", f32::tanh);
     group.bench_function("dropout", |bench| {
         bench.iter(|| dropout_into(black_box(5), 0.1, &x, black_box(&mut y)));
     });

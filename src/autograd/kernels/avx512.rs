@@ -52,6 +52,13 @@ unsafe fn tile<const ROWS: usize, const PANELS: usize, const VECTORS: usize, con
     let mut sums = [[[_mm512_setzero_ps(); VECTORS]; PANELS]; ROWS];
     let (mut a, mut b) = (t.a, t.b);
     let (a_row, a_step) = if DIRECT { (t.a_row, 1) } else { (1, LEFT_STEP) };
+    // C's lines come from afar while the sums are made.
+    for i in 0..ROWS {
+        for part in 0..PANELS * VECTORS {
+            let c = t.c.wrapping_add(i * t.c_row + 16 * part);
+            _mm_prefetch::<_MM_HINT_T0>(c.cast());
+        }
+    }
     for _ in 0..t.k {
         // SAFETY: the caller vouches for k steps of A's rows and B's panels.
         unsafe {

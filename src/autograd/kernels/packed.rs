@@ -17,12 +17,20 @@ pub struct Packed<T> {
 impl<T: Real> Packed<T> {
     /// B `[k, n]`.
     pub fn new(b: Mat<T>) -> Self {
-        Self::new_on(Isa::detected(), Operand::new(b))
+        Self::new_for(Isa::detected(), b)
     }
 
     /// B^T `[k, n]` from b `[n, k]`.
     pub fn transposed(b: Mat<T>) -> Self {
         Self::new_on(Isa::detected(), Operand::transpose(b))
+    }
+
+    /// B `[k, n]` for the kernels of one instruction set, to compare them.
+    ///
+    /// # Panics
+    /// When this CPU lacks the set.
+    pub fn new_for(isa: Isa, b: Mat<T>) -> Self {
+        Self::new_on(isa, Operand::new(b))
     }
 
     /// Replaces the operand by B `[k, n]`; the memory is used again.

@@ -1,4 +1,9 @@
 //! The matrix products of the engine behind one interface.
+//!
+//! All run on the calling thread, and the same call gives the same bits. In f32 on AVX-512 or AVX2
+//! a row of the result has the same bits whatever other rows are in the call, whether B is packed
+//! or not, and on either set. NaN and infinities spread as in the plain sum. What memory a product
+//! needs stays with its thread for the next one.
 
 use super::{Isa, Mat, MatMut, Packed, Real, matrix::Operand};
 
