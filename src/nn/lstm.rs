@@ -25,9 +25,8 @@ impl Lstm {
         hidden: usize,
     ) -> Self {
         let bound = 1.0 / (hidden as f64).sqrt();
-        let mut weight = |kind: &str, shape: &[usize]| {
-            init.uniform(format!("{name}.{kind}_l0"), shape, bound).1
-        };
+        let mut weight =
+            |kind: &str, shape: &[usize]| init.uniform(format!("{name}.{kind}_l0"), shape, bound).1;
         Self {
             weight_ih: weight("weight_ih", &[4 * hidden, inputs]),
             weight_hh: weight("weight_hh", &[4 * hidden, hidden]),

@@ -60,8 +60,7 @@ impl TransformerEncoderLayer {
         Self {
             self_attention: MultiHeadAttention::new(init, &format!("{name}.self_attn"), sizes),
             feed_forward: FeedForward::new(init, name, sizes),
-            norms: [1, 2]
-                .map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
+            norms: [1, 2].map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
             dropout: sizes.dropout,
         }
     }
@@ -121,8 +120,7 @@ impl TransformerDecoderLayer {
             self_attention: attention("self_attn"),
             memory_attention: attention("multihead_attn"),
             feed_forward: FeedForward::new(init, name, sizes),
-            norms: [1, 2, 3]
-                .map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
+            norms: [1, 2, 3].map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
             dropout: sizes.dropout,
         }
     }

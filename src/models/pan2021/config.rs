@@ -154,7 +154,13 @@ impl Pan2021Config {
             vfac,
             ..
         } = self.loss;
-        for (name, value) in [("rec", rec), ("con", con), ("root", root), ("key", key), ("vfac", vfac)] {
+        for (name, value) in [
+            ("rec", rec),
+            ("con", con),
+            ("root", root),
+            ("key", key),
+            ("vfac", vfac),
+        ] {
             if !(value.is_finite() && value >= 0.0) {
                 return complain(format!("model.loss.{name} = {value}: expected 0 or more"));
             }

@@ -81,7 +81,10 @@ pub(super) fn terms<T: Real>(
     }
     Ok(LossTerms {
         total,
-        terms: all.into_iter().map(|(name, _, term)| (name, term)).collect(),
+        terms: all
+            .into_iter()
+            .map(|(name, _, term)| (name, term))
+            .collect(),
     })
 }
 
@@ -181,10 +184,7 @@ fn velocity_consistency<T: Real>(
 }
 
 /// L_root, eq. 9: sum over p^r, o^r of (z~_t - z~_{t-1})^2; standardised.
-fn root_smoothness<T: Real>(
-    tape: &mut Tape<'_, T>,
-    frames: &Frames,
-) -> Result<Var, AutogradError> {
+fn root_smoothness<T: Real>(tape: &mut Tape<'_, T>, frames: &Frames) -> Result<Var, AutogradError> {
     let now = tape.columns(frames.predicted, ROOT)?;
     let before = tape.columns(frames.before, ROOT)?;
     let difference = tape.sub(now, before)?;
@@ -263,7 +263,10 @@ mod tests {
             let all: Vec<_> = (1..=n).map(|t| keyframe_weights(t, n, m)).collect();
             let sum: f64 = all.iter().map(|(a, b)| a + b).sum();
             assert!((sum - 1.0).abs() < 1e-12, "N = {n}");
-            assert!(all[n - 1].1 > all[n - 1].0, "N = {n}: the last frame belongs to k2");
+            assert!(
+                all[n - 1].1 > all[n - 1].0,
+                "N = {n}: the last frame belongs to k2"
+            );
         }
     }
 }

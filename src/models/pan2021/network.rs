@@ -68,10 +68,18 @@ impl Pan2021 {
         config.check()?;
         let (wide, code) = (config.hidden, config.code);
         let state_encoder = Mlp::new(init, "state_encoder", &[STATE.len(), wide, code], true);
-        let velocity_encoder =
-            Mlp::new(init, "velocity_encoder", &[VELOCITIES.len(), wide, code], true);
-        let target_controller =
-            Mlp::new(init, "target_controller", &[KEYFRAME.len(), wide, code], true);
+        let velocity_encoder = Mlp::new(
+            init,
+            "velocity_encoder",
+            &[VELOCITIES.len(), wide, code],
+            true,
+        );
+        let target_controller = Mlp::new(
+            init,
+            "target_controller",
+            &[KEYFRAME.len(), wide, code],
+            true,
+        );
         let codes = if config.velocity_factor { 4 } else { 3 };
         let last_input = match config.lstms {
             1 => (codes + 1) * code,
