@@ -4,7 +4,9 @@
 
 pub mod interpolation;
 pub mod network;
+pub mod registry;
 pub mod transition;
+pub mod weights;
 
 pub use network::{Batch, Feed, LossTerms, Network};
 pub use transition::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
