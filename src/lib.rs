@@ -10,6 +10,7 @@
 //! - [`models`]: what fills the frames between two keyframes, behind one trait.
 //! - [`training`]: curriculum, scheduled sampling, losses, the loop, checkpoints.
 //! - [`evaluation`]: LRP, AVF and ART by the paper's protocol, and its tables.
+//! - [`report`]: figures of losses, scores and dancers.
 //! - [`cli`]: the subcommands of the binary.
 #![deny(unsafe_code)]
 
@@ -21,4 +22,5 @@ pub mod models;
 pub mod motion;
 pub mod nn;
 pub mod optim;
+pub mod report;
 pub mod training;

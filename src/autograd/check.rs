@@ -271,7 +271,12 @@ pub(super) mod property {
 
     /// Two shapes that broadcast together (numpy's rules), of up to three axes of up to three, zero among them.
     pub fn broadcast_shapes() -> BoxedStrategy<(Vec<usize>, Vec<usize>)> {
-        (prop::collection::vec(0usize..4, 0..4), any::<[bool; 6]>(), 0usize..4, 0usize..4)
+        (
+            prop::collection::vec(0usize..4, 0..4),
+            any::<[bool; 6]>(),
+            0usize..4,
+            0usize..4,
+        )
             .prop_map(|(shape, ones, cut_a, cut_b)| {
                 let shrink = |from: usize, cut: usize| -> Vec<usize> {
                     shape

@@ -44,7 +44,11 @@ impl<T: Real> Staging<T> {
 
     pub(super) fn product_into(&self, gradient: &mut [T], accumulate: bool) {
         product_at(
-            Mat::new(&self.dy[..self.rows * self.outputs], self.rows, self.outputs),
+            Mat::new(
+                &self.dy[..self.rows * self.outputs],
+                self.rows,
+                self.outputs,
+            ),
             Mat::new(&self.x[..self.rows * self.inputs], self.rows, self.inputs),
             MatMut::new(gradient, self.outputs, self.inputs),
             accumulate,

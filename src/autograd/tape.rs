@@ -216,8 +216,7 @@ impl<'a, T: Real> Tape<'a, T> {
         operation: impl FnOnce() -> O,
     ) -> Var {
         let needs_gradient = self.recording && inputs.iter().any(|&v| self.needs_gradient(v));
-        let operation =
-            needs_gradient.then(|| -> Box<dyn Operation<T>> { Box::new(operation()) });
+        let operation = needs_gradient.then(|| -> Box<dyn Operation<T>> { Box::new(operation()) });
         self.push(name, inputs, shape, output, needs_gradient, operation)
     }
 
@@ -297,12 +296,7 @@ impl<'a, T: Real> Tape<'a, T> {
         Ok(())
     }
 
-    fn non_finite(
-        &self,
-        index: usize,
-        what: &'static str,
-        place: &'static str,
-    ) -> AutogradError {
+    fn non_finite(&self, index: usize, what: &'static str, place: &'static str) -> AutogradError {
         let node = &self.nodes[index];
         AutogradError::NonFinite {
             operation: node.name,
@@ -310,7 +304,11 @@ impl<'a, T: Real> Tape<'a, T> {
             what,
             place,
             shape: self.shape(Var(index as u32)).to_vec(),
-            inputs: node.inputs.iter().map(|&v| self.shape(v).to_vec()).collect(),
+            inputs: node
+                .inputs
+                .iter()
+                .map(|&v| self.shape(v).to_vec())
+                .collect(),
         }
     }
 
@@ -455,9 +453,10 @@ fn array_of<'s, T: Real>(
 }
 
 fn not_finite<T: Real>(values: &[T]) -> Option<&'static str> {
-    values.iter().find(|x| !x.is_finite()).map(|x| {
-        if x.is_nan() { "NaN" } else { "infinity" }
-    })
+    values
+        .iter()
+        .find(|x| !x.is_finite())
+        .map(|x| if x.is_nan() { "NaN" } else { "infinity" })
 }
 
 /// Where an operation's way back writes the gradient of one input.
@@ -583,8 +582,8 @@ impl<'s, T: Real> Backward<'s, T> {
             }
             return;
         }
-        let staging = self.stagings[weight.index()]
-            .get_or_insert_with(|| Staging::new(dy.cols, x.cols));
+        let staging =
+            self.stagings[weight.index()].get_or_insert_with(|| Staging::new(dy.cols, x.cols));
         staging.push(dy, x, self.workspace);
         if staging.is_full() {
             self.flush_staging(weight);

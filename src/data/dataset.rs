@@ -47,7 +47,7 @@ pub enum DataError {
     },
     #[error(
         "the data folder {folder} holds no .bvh file; the 123 dance clips are in the repository \
-         https://github.com/wslh852/Keyframe-based-Complex-Motion-Synthesis (they come from DanceDB, http://dancedb.cs.ucy.ac.cy)"
+         https://github.com/wslh852/Keyframe-based-Complex-Motion-Synthesis (they come from DanceDB, http://dancedb.eu)"
     )]
     NoClips { folder: PathBuf },
     #[error("{path} cannot be read")]

@@ -1,5 +1,6 @@
 //! Data sets: clips become features, a split, standardised numbers and windows.
 
+pub mod choreography;
 pub mod config;
 pub mod dataset;
 mod split;

@@ -104,7 +104,7 @@ pub enum EvaluationError {
         clip: String,
         start: usize,
         end: usize,
-        source: ModelError,
+        source: Box<ModelError>,
     },
     #[error("{model}, a chunk of windows at N = {length} that starts with {clip}, frame {start}")]
     Chunk {
@@ -112,7 +112,7 @@ pub enum EvaluationError {
         length: usize,
         clip: String,
         start: usize,
-        source: ModelError,
+        source: Box<ModelError>,
     },
 }
 
@@ -221,7 +221,7 @@ fn measure_chunk(
             length,
             clip: clips[chunk[0].clip].name.clone(),
             start: chunk[0].start,
-            source,
+            source: Box::new(source),
         })?;
     if transitions.len() != chunk.len() {
         return Err(EvaluationError::TransitionCount {
@@ -241,7 +241,7 @@ fn measure_chunk(
                     clip: clips[window.clip].name.clone(),
                     start: window.start,
                     end: window.start + length,
-                    source,
+                    source: Box::new(source),
                 }
             })
         })

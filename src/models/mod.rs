@@ -4,9 +4,13 @@
 
 pub mod interpolation;
 pub mod network;
+pub mod pan2021;
 pub mod registry;
+pub mod trained;
 pub mod transition;
 pub mod weights;
 
 pub use network::{Batch, Feed, LossTerms, Network};
+pub use registry::ModelConfig;
+pub use trained::TrainedModel;
 pub use transition::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};

@@ -1,19 +1,29 @@
-//! The models by the name that a config gives them.
+//! The models by their name in a config: the one place that names them all.
 
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{ModelError, Network};
+use super::interpolation::Interpolation;
+use super::pan2021::{Pan2021, Pan2021Config};
+use super::{ModelError, Network, TransitionModel};
 use crate::autograd::Real;
 use crate::data::Standardisation;
 use crate::nn::Initialiser;
 
-/// The `[model]` table of an experiment's config.
+/// The `[model]` table of an experiment's config; `kind` says which.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum ModelConfig {
+    /// Pan et al. 2021, and its ablations.
     Pan2021(Pan2021Config),
-    Interpolation,
+    /// Slerp between the keyframes; nothing to train.
+    Interpolation(NoSettings),
 }
+
+/// A table without keys.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoSettings {}
 
 impl Default for ModelConfig {
     fn default() -> Self {
@@ -21,30 +31,30 @@ impl Default for ModelConfig {
     }
 }
 
-/// Fields of the network of Pan et al. 2021.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Pan2021Config {
-    pub lstms: usize,
-}
-
-impl Default for Pan2021Config {
-    fn default() -> Self {
-        Self { lstms: 2 }
-    }
-}
-
 impl ModelConfig {
+    /// The network to train, its weights added through `init`.
+    ///
     /// # Errors
-    /// The model has nothing to train.
-    pub fn build<T: Real, R: rand::Rng>(
+    /// A model that is not trained; settings that do not fit together.
+    pub fn build<T: Real, R: Rng>(
         &self,
-        _init: &mut Initialiser<'_, T, R>,
-        _standardisation: &Standardisation,
+        init: &mut Initialiser<'_, T, R>,
+        standardisation: &Standardisation,
     ) -> Result<Box<dyn Network<T>>, ModelError> {
-        Err(ModelError::Model {
-            model: "pan2021".into(),
-            reason: "not built".into(),
-        })
+        match self {
+            Self::Pan2021(config) => Ok(Box::new(Pan2021::new(init, config, standardisation)?)),
+            Self::Interpolation(_) => Err(ModelError::Model {
+                model: "interpolation".into(),
+                reason: "has no weights and needs no training; evaluate its config as it is".into(),
+            }),
+        }
+    }
+
+    /// The model, where it needs no training.
+    pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn TransitionModel>> {
+        match self {
+            Self::Interpolation(_) => Some(Box::new(Interpolation { contact_threshold })),
+            Self::Pan2021(_) => None,
+        }
     }
 }

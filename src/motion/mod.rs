@@ -7,9 +7,12 @@ pub mod clip;
 pub mod contact;
 pub mod facing;
 pub mod features;
+pub mod fit;
+pub mod ik;
 pub mod mapping;
 pub mod placement;
 pub mod resample;
+pub mod rotation_fit;
 pub mod skeleton;
 pub mod velocity_factor;
 

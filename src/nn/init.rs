@@ -25,7 +25,12 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
         self.parameters.add(name, value)
     }
 
-    pub fn constant(&mut self, name: String, shape: &[usize], value: f64) -> (ParameterId, BlockId) {
+    pub fn constant(
+        &mut self,
+        name: String,
+        shape: &[usize],
+        value: f64,
+    ) -> (ParameterId, BlockId) {
         let value = ArrayD::from_elem(IxDyn(shape), T::from_f64(value));
         self.parameters.add(name, value)
     }

@@ -1,5 +1,19 @@
-//! Layers as structs of parameters; names and layouts are PyTorch's.
+//! Layers as structs of parameters; names, layouts and initial values are PyTorch's.
 
+mod attention;
 mod init;
+mod linear;
+mod lstm;
+mod mlp;
+mod norm;
+mod positions;
+mod transformer;
 
+pub use attention::MultiHeadAttention;
 pub use init::Initialiser;
+pub use linear::Linear;
+pub use lstm::Lstm;
+pub use mlp::Mlp;
+pub use norm::LayerNorm;
+pub use positions::sinusoidal_positions;
+pub use transformer::{TransformerDecoderLayer, TransformerEncoderLayer, TransformerSizes};

@@ -2,6 +2,10 @@
 
 use std::sync::OnceLock;
 
+use super::blocked::Kernels;
+#[cfg(target_arch = "x86_64")]
+use super::{avx2, avx512};
+
 /// An instruction set that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Isa {
@@ -14,38 +18,59 @@ pub enum Isa {
 }
 
 impl Isa {
+    /// Every set, best first.
+    pub const ALL: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
+
     /// The best set this CPU has.
     #[inline]
     pub fn detected() -> Self {
         static DETECTED: OnceLock<Isa> = OnceLock::new();
-        *DETECTED.get_or_init(|| Self::available()[0])
+        *DETECTED.get_or_init(|| {
+            let available = Self::ALL.into_iter().find(|isa| isa.is_available());
+            available.unwrap_or(Self::Portable)
+        })
     }
 
-    /// Every set this CPU has, best first; the last one is [`Isa::Portable`].
-    pub fn available() -> Vec<Self> {
-        let mut sets = Vec::new();
+    /// Whether this CPU has the set.
+    #[inline]
+    pub fn is_available(self) -> bool {
         #[cfg(target_arch = "x86_64")]
         {
             let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            let avx512 = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512bw")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl");
-            if avx2 && avx512 {
-                sets.push(Self::Avx512);
-            }
-            if avx2 {
-                sets.push(Self::Avx2);
+            match self {
+                Self::Avx512 => {
+                    avx2 && is_x86_feature_detected!("avx512f")
+                        && is_x86_feature_detected!("avx512bw")
+                        && is_x86_feature_detected!("avx512dq")
+                        && is_x86_feature_detected!("avx512vl")
+                }
+                Self::Avx2 => avx2,
+                Self::Portable => true,
             }
         }
-        sets.push(Self::Portable);
-        sets
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            self == Self::Portable
+        }
     }
 
-    /// Panics unless this CPU has the set.
+    /// The f32 kernels of the set, for sets that have some.
+    ///
+    /// # Panics
+    /// When this CPU lacks the set: the kernels' callers rely on it.
+    #[inline]
     #[track_caller]
-    pub(super) fn require(self) {
-        assert!(Self::available().contains(&self), "this CPU lacks {self:?}");
+    pub(super) fn kernels(self) -> Option<&'static Kernels> {
+        #[cfg(target_arch = "x86_64")]
+        {
+            assert!(self.is_available(), "this CPU lacks {self:?}");
+            match self {
+                Self::Avx512 => return Some(&avx512::KERNELS),
+                Self::Avx2 => return Some(&avx2::KERNELS),
+                Self::Portable => {}
+            }
+        }
+        None
     }
 }
 

@@ -44,16 +44,16 @@ pub fn exp(x: f32) -> f32 {
 #[inline(always)]
 pub fn tanh(x: f32) -> f32 {
     let size = x.abs();
-    let large = (1.0 - 2.0 / (exp(size + size) + 1.0)).copysign(x);
+    let large = 1.0 - 2.0 / (exp(size + size) + 1.0);
     // Minimax on [-0.625, 0.625] (Cephes).
-    let z = x * x;
+    let z = size * size;
     let p = -5.704_988_7e-3;
     let p = p * z + 2.063_909e-2;
     let p = p * z - 5.373_971_5e-2;
     let p = p * z + 1.333_144_2e-1;
     let p = p * z - 3.333_328e-1;
-    let small = p * z * x + x;
-    if size > 0.625 { large } else { small }
+    let small = p * z * size + size;
+    (if size > 0.625 { large } else { small }).copysign(x)
 }
 
 /// Logistic function 1 / (1 + e^-x).

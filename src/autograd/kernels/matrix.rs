@@ -117,3 +117,75 @@ impl<'a, T> MatMut<'a, T> {
         self
     }
 }
+
+/// A matrix or its transpose, as an operand of a product.
+#[derive(Clone, Copy, Debug)]
+pub struct Operand<'a, T> {
+    /// The matrix as it lies in memory.
+    pub matrix: Mat<'a, T>,
+    /// Whether the operand is its transpose.
+    pub transposed: bool,
+}
+
+impl<'a, T> Operand<'a, T> {
+    /// The matrix itself; its shape is checked again, as kernels rely on it.
+    #[inline]
+    #[track_caller]
+    pub fn new(matrix: Mat<'a, T>) -> Self {
+        Self {
+            matrix: matrix.checked(),
+            transposed: false,
+        }
+    }
+
+    /// The transpose; the shape is checked again, as kernels rely on it.
+    #[inline]
+    #[track_caller]
+    pub fn transpose(matrix: Mat<'a, T>) -> Self {
+        Self {
+            matrix: matrix.checked(),
+            transposed: true,
+        }
+    }
+
+    /// `rows` rows of `cols` numbers without gaps.
+    #[inline]
+    #[track_caller]
+    pub fn rows_of(data: &'a [T], rows: usize, cols: usize) -> Self {
+        Self {
+            matrix: Mat::new(data, rows, cols),
+            transposed: false,
+        }
+    }
+
+    /// Number of rows of the operand.
+    #[inline]
+    pub fn rows(&self) -> usize {
+        if self.transposed {
+            self.matrix.cols
+        } else {
+            self.matrix.rows
+        }
+    }
+
+    /// Number of columns of the operand.
+    #[inline]
+    pub fn cols(&self) -> usize {
+        if self.transposed {
+            self.matrix.rows
+        } else {
+            self.matrix.cols
+        }
+    }
+
+    /// Distances between adjacent rows and between adjacent columns of the operand.
+    #[inline]
+    pub fn strides(&self) -> (usize, usize) {
+        let stride = self.matrix.stride;
+        if self.transposed {
+            (1, stride)
+        } else {
+            (stride, 1)
+        }
+    }
+}

@@ -8,12 +8,18 @@
 //! `matrixmultiply`.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod blocked;
+mod buffer;
 mod dropout;
+mod gemm;
 mod isa;
 mod math;
 mod matrix;
 mod packed;
-mod portable;
 mod product;
 mod real;
 

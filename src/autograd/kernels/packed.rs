@@ -1,11 +1,15 @@
 //! Right operands laid out once for many products.
 
-use super::{Mat, Real};
+use super::{Isa, Mat, Real, buffer::Buffer, matrix::Operand};
 
 /// A right operand `[k, n]` of products, laid out once for many of them.
+///
+/// For the f32 kernels the columns stand in panels as wide as a kernel's tile, each with its rows
+/// one after another, the last filled up with zeros.
 #[derive(Clone, Debug)]
 pub struct Packed<T> {
-    data: Vec<T>,
+    isa: Isa,
+    buffer: Buffer<T>,
     rows: usize,
     cols: usize,
 }
@@ -13,46 +17,30 @@ pub struct Packed<T> {
 impl<T: Real> Packed<T> {
     /// B `[k, n]`.
     pub fn new(b: Mat<T>) -> Self {
-        let mut packed = Self {
-            data: Vec::new(),
-            rows: 0,
-            cols: 0,
-        };
-        packed.repack(b);
-        packed
+        Self::new_for(Isa::detected(), b)
     }
 
     /// B^T `[k, n]` from b `[n, k]`.
     pub fn transposed(b: Mat<T>) -> Self {
-        let mut packed = Self {
-            data: Vec::new(),
-            rows: 0,
-            cols: 0,
-        };
-        packed.repack_transposed(b);
-        packed
+        Self::new_on(Isa::detected(), Operand::transpose(b))
+    }
+
+    /// B `[k, n]` for the kernels of one instruction set, to compare them.
+    ///
+    /// # Panics
+    /// When this CPU lacks the set.
+    pub fn new_for(isa: Isa, b: Mat<T>) -> Self {
+        Self::new_on(isa, Operand::new(b))
     }
 
     /// Replaces the operand by B `[k, n]`; the memory is used again.
     pub fn repack(&mut self, b: Mat<T>) {
-        let b = b.checked();
-        (self.rows, self.cols) = (b.rows, b.cols);
-        self.data.clear();
-        for i in 0..b.rows {
-            self.data
-                .extend_from_slice(&b.data[i * b.stride..][..b.cols]);
-        }
+        self.pack(Operand::new(b));
     }
 
     /// Replaces the operand by B^T `[k, n]` from b `[n, k]`; the memory is used again.
     pub fn repack_transposed(&mut self, b: Mat<T>) {
-        let b = b.checked();
-        (self.rows, self.cols) = (b.cols, b.rows);
-        self.data.clear();
-        for i in 0..b.cols {
-            self.data
-                .extend((0..b.rows).map(|j| b.data[j * b.stride + i]));
-        }
+        self.pack(Operand::transpose(b));
     }
 
     /// k, the number of rows.
@@ -65,7 +53,27 @@ impl<T: Real> Packed<T> {
         self.cols
     }
 
-    pub(super) fn matrix(&self) -> Mat<'_, T> {
-        Mat::new(&self.data, self.rows, self.cols)
+    pub(super) fn new_on(isa: Isa, b: Operand<T>) -> Self {
+        let mut packed = Self {
+            isa,
+            buffer: Buffer::new(),
+            rows: 0,
+            cols: 0,
+        };
+        packed.pack(b);
+        packed
+    }
+
+    pub(super) fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    pub(super) fn data(&self) -> &[T] {
+        self.buffer.as_slice()
+    }
+
+    fn pack(&mut self, b: Operand<T>) {
+        (self.rows, self.cols) = (b.rows(), b.cols());
+        T::pack(self.isa, b, &mut self.buffer);
     }
 }

@@ -1,6 +1,11 @@
 //! The matrix products of the engine behind one interface.
+//!
+//! All run on the calling thread, and the same call gives the same bits. In f32 on AVX-512 or AVX2
+//! a row of the result has the same bits whatever other rows are in the call, whether B is packed
+//! or not, and on either set. NaN and infinities spread as in the plain sum. What memory a product
+//! needs stays with its thread for the next one.
 
-use super::{Mat, MatMut, Packed, Real};
+use super::{Isa, Mat, MatMut, Packed, Real, matrix::Operand};
 
 /// C = A B, or C += A B with `accumulate`; A `[m, k]`, B `[k, n]`, C `[m, n]`.
 ///
@@ -8,10 +13,11 @@ use super::{Mat, MatMut, Packed, Real};
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    strided(
-        (a.checked(), false),
-        (b.checked(), false),
-        c.checked(),
+    product_on(
+        Isa::detected(),
+        Operand::new(a),
+        Operand::new(b),
+        c,
         accumulate,
     );
 }
@@ -22,10 +28,11 @@ pub fn product<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product_bt<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    strided(
-        (a.checked(), false),
-        (b.checked(), true),
-        c.checked(),
+    product_on(
+        Isa::detected(),
+        Operand::new(a),
+        Operand::transpose(b),
+        c,
         accumulate,
     );
 }
@@ -36,10 +43,11 @@ pub fn product_bt<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool)
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product_at<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    strided(
-        (a.checked(), true),
-        (b.checked(), false),
-        c.checked(),
+    product_on(
+        Isa::detected(),
+        Operand::transpose(a),
+        Operand::new(b),
+        c,
         accumulate,
     );
 }
@@ -50,43 +58,31 @@ pub fn product_at<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool)
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product_packed<T: Real>(a: Mat<T>, b: &Packed<T>, c: MatMut<T>, accumulate: bool) {
-    product(a, b.matrix(), c, accumulate);
+    let (a, c) = (Operand::new(a), c.checked());
+    fit((a.rows(), a.cols()), (b.rows(), b.cols()), (c.rows, c.cols));
+    T::product_packed(b.isa(), a, b.data(), c, accumulate);
 }
 
+/// C (+)= A B on one instruction set.
 #[track_caller]
-fn strided<T: Real>(a: (Mat<T>, bool), b: (Mat<T>, bool), c: MatMut<T>, accumulate: bool) {
-    let (m, ka, rsa, csa) = oriented(a);
-    let (kb, n, rsb, csb) = oriented(b);
-    assert!(
-        ka == kb && c.rows == m && c.cols == n,
-        "a product of [{m}, {ka}] and [{kb}, {n}] into [{}, {}]",
-        c.rows,
-        c.cols
-    );
-    if m == 0 || n == 0 {
-        return;
-    }
-    let beta = if accumulate { T::one() } else { T::zero() };
-    // SAFETY: shapes agree, and each was checked against its slice; C is borrowed exclusively.
-    unsafe {
-        T::gemm(
-            m,
-            ka,
-            n,
-            (a.0.data.as_ptr(), rsa, csa),
-            (b.0.data.as_ptr(), rsb, csb),
-            beta,
-            (c.data.as_mut_ptr(), c.stride as isize, 1),
-        );
-    }
+pub(super) fn product_on<T: Real>(
+    isa: Isa,
+    a: Operand<T>,
+    b: Operand<T>,
+    c: MatMut<T>,
+    accumulate: bool,
+) {
+    let c = c.checked();
+    fit((a.rows(), a.cols()), (b.rows(), b.cols()), (c.rows, c.cols));
+    T::product(isa, a, b, c, accumulate);
 }
 
-/// Rows, columns, row stride and column stride of a matrix or its transpose.
-fn oriented<T>((matrix, transposed): (Mat<T>, bool)) -> (usize, usize, isize, isize) {
-    let stride = matrix.stride as isize;
-    if transposed {
-        (matrix.cols, matrix.rows, 1, stride)
-    } else {
-        (matrix.rows, matrix.cols, stride, 1)
-    }
+/// Panics unless a product of shapes `a` and `b` has shape `c`.
+#[inline]
+#[track_caller]
+fn fit(a: (usize, usize), b: (usize, usize), c: (usize, usize)) {
+    assert!(
+        a.1 == b.0 && c == (a.0, b.1),
+        "a product of {a:?} and {b:?} does not give {c:?}"
+    );
 }

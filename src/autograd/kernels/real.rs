@@ -3,7 +3,7 @@
 use ndarray::NdFloat;
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{isa::vectorised, math, portable::Gemm};
+use super::{gemm::Gemm, isa::vectorised, math};
 
 /// A floating point type that the engine computes in: f32 or f64.
 ///

@@ -15,7 +15,11 @@ pub(super) fn broadcast_shape(
     let axes = a.len().max(b.len());
     let size = |shape: &[usize], axis: usize| {
         let missing = axes - shape.len();
-        if axis < missing { 1 } else { shape[axis - missing] }
+        if axis < missing {
+            1
+        } else {
+            shape[axis - missing]
+        }
     };
     (0..axes)
         .map(|axis| match (size(a, axis), size(b, axis)) {

@@ -54,6 +54,7 @@ operations!(
     sqrt,
     square,
     stack,
+    strided_rows,
     sub,
     sum,
     sum_last,

@@ -112,7 +112,7 @@ impl Hierarchy {
             .enumerate()
         {
             let word = scanner.word_on_line();
-            offset[axis] = scanner.number(word, what)?;
+            offset[axis] = scanner.number(word, || what.to_string())?;
         }
         if let Some(block) = self.open.last_mut() {
             block.has_offset = true;

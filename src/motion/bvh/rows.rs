@@ -67,7 +67,7 @@ fn rows(scanner: &mut Scanner, frames: usize, channels: usize) -> Result<Array2<
             ));
         }
         for (column, word) in line.split_whitespace().enumerate() {
-            values.push(scanner.number(Some(word), &format!("value {} of the row", column + 1))?);
+            values.push(scanner.number(Some(word), || format!("value {} of the row", column + 1))?);
         }
         read += 1;
     }

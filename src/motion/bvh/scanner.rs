@@ -79,9 +79,13 @@ impl<'a> Scanner<'a> {
     }
 
     /// Reads a word as a finite number of a believable size; `what` names it in the error.
-    pub fn number(&self, word: Option<&str>, what: &str) -> Result<f64, BvhError> {
-        let expected =
-            || format!("{what}, a number between -{LARGEST_NUMBER} and {LARGEST_NUMBER}");
+    pub fn number(&self, word: Option<&str>, what: impl Fn() -> String) -> Result<f64, BvhError> {
+        let expected = || {
+            format!(
+                "{}, a number between -{LARGEST_NUMBER} and {LARGEST_NUMBER}",
+                what()
+            )
+        };
         let text = word.ok_or_else(|| self.error(expected(), "the end of the line".into()))?;
         match text.parse::<f64>() {
             Ok(number) if is_sound(number) => Ok(number),

@@ -1,0 +1,148 @@
+//! The built-in choreography: human dance motion on the dance skeleton, from a seed.
+//!
+//! For whoever has no motion capture. A clip is made in layers, each a file, in this order:
+//! `style` (what kind of dance) and `rhythm` (beats to frames); `figures` write a `score`: what feet, pelvis, trunk,
+//! head and arms do when; `feet` turns it into planted and swinging feet and the true contacts; `pelvis` finds
+//! the path of the pelvis within the legs' reach; `assembly` finds the rotations, the legs' by inverse kinematics.
+
+mod assembly;
+mod body;
+mod curve;
+mod feet;
+mod figures;
+mod pelvis;
+mod rhythm;
+mod score;
+mod style;
+mod upper_body;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::motion::Clip;
+
+use feet::{Foot, FootPose};
+use figures::Family;
+use rhythm::{FRAME_RATE, Rhythm};
+use score::Score;
+use style::Style;
+
+/// Fewest frames of a clip: two, so that there is a velocity.
+const FEWEST_FRAMES: usize = 2;
+/// Most frames of a clip (about nine hours).
+const MOST_FRAMES: usize = 1_000_000;
+
+/// Distance (cm) from the middle of the floor at which a dancer turns back.
+const FARTHEST: f64 = 120.0;
+
+/// What to generate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ChoreographyConfig {
+    /// Number of clips; styles take turns.
+    pub clips: usize,
+    /// Frames of each clip, at 30 a second.
+    pub frames_per_clip: usize,
+    /// Everything follows from it, to the bit on one platform. Clip n is the same however many clips are asked for.
+    pub seed: u64,
+}
+
+impl Default for ChoreographyConfig {
+    fn default() -> Self {
+        Self {
+            clips: 24,
+            frames_per_clip: 900,
+            seed: 0,
+        }
+    }
+}
+
+/// Why there is no choreography.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ChoreographyError {
+    #[error("choreography: `clips` is 0; ask for at least one clip")]
+    NoClips,
+    #[error(
+        "choreography: `frames_per_clip` is {frames}; it must be between {FEWEST_FRAMES} and {MOST_FRAMES}"
+    )]
+    Frames { frames: usize },
+}
+
+/// A generated clip with what only its maker knows for certain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeneratedClip {
+    /// The motion: dance skeleton, cm, 30 frames a second.
+    pub clip: Clip,
+    /// `[frames]` of LeftFoot, LeftToeBase, RightFoot, RightToeBase: whether the joint was held still by a planted foot since the
+    /// frame before. The first frame counts what the second does.
+    pub contacts: Vec<[bool; 4]>,
+}
+
+/// Generates the clips of a configuration.
+///
+/// # Errors
+/// [`ChoreographyError`] where no clip is asked for, or clips shorter or longer than what can be made.
+pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, ChoreographyError> {
+    if config.clips == 0 {
+        return Err(ChoreographyError::NoClips);
+    }
+    if !(FEWEST_FRAMES..=MOST_FRAMES).contains(&config.frames_per_clip) {
+        return Err(ChoreographyError::Frames {
+            frames: config.frames_per_clip,
+        });
+    }
+    Ok((0..config.clips)
+        .map(|number| dance(number, config.frames_per_clip, config.seed))
+        .collect())
+}
+
+/// One clip, on a random stream of its own.
+fn dance(number: usize, frames: usize, seed: u64) -> GeneratedClip {
+    let mut rng = ChaCha12Rng::seed_from_u64(seed);
+    rng.set_stream(number as u64);
+    let style = Style::draw(number, &mut rng);
+    let name = format!("choreography_{number:03}_{}.bvh", style.name);
+    let rhythm = Rhythm::new(style.draw_tempo(&mut rng), style.rubato, &mut rng);
+    let heading = rng.random_range(0.0..std::f64::consts::TAU);
+    let mut score = Score::new(style, rhythm, heading);
+    let mut last: Option<Family> = None;
+    while score.frame(0.0) < frames as f64 {
+        if score.centre.length() > FARTHEST {
+            figures::return_to_the_middle(&mut score, &mut rng);
+            continue;
+        }
+        let family = score.style.draw_family(&mut rng);
+        // The same family rarely follows itself.
+        if last == Some(family) && rng.random_bool(0.6) {
+            continue;
+        }
+        family.perform(&mut score, &mut rng);
+        last = Some(family);
+    }
+    let flight = pelvis::flight(&score.jumps, frames);
+    let feet =
+        [Foot::Left, Foot::Right].map(|foot| score.feet[foot.index()].sample(frames, &flight));
+    let pelvis = pelvis::path(&score, &feet);
+    let skeleton = body::skeleton();
+    let poses = assembly::poses(&score, &skeleton, &feet, &pelvis, &mut rng);
+    let clip = Clip {
+        name,
+        skeleton,
+        frame_time: 1.0 / FRAME_RATE,
+        poses,
+    };
+    GeneratedClip {
+        clip,
+        contacts: contacts(&feet),
+    }
+}
+
+fn contacts(feet: &[Vec<FootPose>; 2]) -> Vec<[bool; 4]> {
+    let [left, right] = [0, 1].map(|foot| feet::contacts(&feet[foot]));
+    left.iter()
+        .zip(right)
+        .map(|(l, r)| [l[0], l[1], r[0], r[1]])
+        .collect()
+}

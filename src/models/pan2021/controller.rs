@@ -1,0 +1,398 @@
+//! The root trajectory controller and the velocity factor controller (section 3.2, figure 3).
+//!
+//! Both read, for the prediction of frame t + 1, two segments of u frames centred on t + 1: the target segment holds the given
+//! values, the mixture segment what was fed for the frames up to t. Frames beyond an end of the transition repeat it.
+//!
+//! A token's embedding is linear in its c numbers plus a constant of its position, so it is one product with the numbers
+//! and a one-hot position, `[c + u]`; so are its first projections to queries, keys and values. Those composed weights are made
+//! once a tape.
+
+use ndarray::Array2;
+use rand::Rng;
+
+use super::config::{Controllers, Pan2021Config};
+use super::units::constant;
+use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::nn::{
+    Initialiser, Linear, Mlp, TransformerDecoderLayer, TransformerEncoderLayer,
+    sinusoidal_positions,
+};
+
+/// Windows coded at once where few are asked for: products with few rows are slow.
+const WINDOWS_AT_ONCE: usize = 32;
+
+/// A controller's weights.
+#[derive(Debug, Clone)]
+pub(super) struct Controller {
+    /// c: numbers of a frame.
+    channels: usize,
+    /// u: frames of a segment.
+    window: usize,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Transformer(Box<TransformerController>),
+    FullyConnected(Mlp),
+}
+
+#[derive(Debug, Clone)]
+struct TransformerController {
+    target_projection: Linear,
+    mixture_projection: Linear,
+    encoder: Vec<TransformerEncoderLayer>,
+    decoder: Vec<TransformerDecoderLayer>,
+    output: Linear,
+    positions: Array2<f64>,
+}
+
+/// The values that a controller is given for a transition, `[N + 1, windows, c]`.
+pub(super) struct Trajectory<T> {
+    pub(super) values: Vec<T>,
+    pub(super) frames: usize,
+    pub(super) windows: usize,
+}
+
+impl<T: Real> Trajectory<T> {
+    fn frame(&self, frame: usize) -> &[T] {
+        let len = self.values.len() / self.frames.max(1);
+        &self.values[frame * len..(frame + 1) * len]
+    }
+}
+
+/// A controller at work on one tape.
+pub(super) struct Session<'c, T> {
+    controller: &'c Controller,
+    trajectory: Trajectory<T>,
+    composed: Option<Composed>,
+    /// Coded target segments of the frames from `first` on.
+    memory: Option<Memory>,
+}
+
+/// Weights made on the tape, see the module's page.
+struct Composed {
+    one_hot: Vec<Var>,
+    target: Embedding,
+    mixture: Embedding,
+}
+
+#[derive(Clone, Copy)]
+struct Embedding {
+    /// `[d, c + u]`
+    token: Var,
+    /// `[3d, c + u]`
+    projections: Var,
+}
+
+struct Memory {
+    first: usize,
+    frames: usize,
+    /// The encoder's output, `[frames * windows * u, d]`.
+    tokens: Var,
+    /// Keys and values for each decoder layer but the last, `[frames * windows * u, 2d]`.
+    projected: Vec<Var>,
+}
+
+impl Controller {
+    pub(super) fn new<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        channels: usize,
+        config: &Pan2021Config,
+    ) -> Self {
+        let (d, window) = (config.code, config.window);
+        let kind = match config.controllers {
+            Controllers::FullyConnected => {
+                Kind::FullyConnected(Mlp::new(init, name, &[2 * window * channels, d, d], true))
+            }
+            Controllers::Transformer => {
+                let sizes = config.transformer();
+                let projection = |init: &mut Initialiser<'_, T, R>, kind: &str| {
+                    Linear::new(init, &format!("{name}.{kind}"), channels, d)
+                };
+                Kind::Transformer(Box::new(TransformerController {
+                    target_projection: projection(init, "target_projection"),
+                    mixture_projection: projection(init, "mixture_projection"),
+                    encoder: (0..config.encoder_layers)
+                        .map(|k| {
+                            let name = format!("{name}.encoder.layers.{k}");
+                            TransformerEncoderLayer::new(init, &name, sizes)
+                        })
+                        .collect(),
+                    decoder: (0..config.decoder_layers)
+                        .map(|k| {
+                            let name = format!("{name}.decoder.layers.{k}");
+                            TransformerDecoderLayer::new(init, &name, sizes)
+                        })
+                        .collect(),
+                    output: Linear::new(init, &format!("{name}.output"), d, d),
+                    positions: sinusoidal_positions(window, d),
+                }))
+            }
+        };
+        Self {
+            channels,
+            window,
+            kind,
+        }
+    }
+
+    /// Starts on a transition.
+    pub(super) fn start<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        trajectory: Trajectory<T>,
+    ) -> Result<Session<'_, T>, AutogradError> {
+        let composed = match &self.kind {
+            Kind::FullyConnected(_) => None,
+            Kind::Transformer(transformer) => {
+                let (windows, u) = (trajectory.windows, self.window);
+                let one_hot = (0..u)
+                    .map(|position| {
+                        tape.constant_with(&[windows, u], |out| {
+                            out.fill(T::zero());
+                            for row in out.chunks_exact_mut(u) {
+                                row[position] = T::one();
+                            }
+                        })
+                    })
+                    .collect();
+                Some(Composed {
+                    one_hot,
+                    target: transformer.compose(
+                        tape,
+                        transformer.target_projection,
+                        transformer.encoder[0].self_attention.in_projection,
+                    )?,
+                    mixture: transformer.compose(
+                        tape,
+                        transformer.mixture_projection,
+                        transformer.decoder[0].self_attention.in_projection,
+                    )?,
+                })
+            }
+        };
+        Ok(Session {
+            controller: self,
+            trajectory,
+            composed,
+            memory: None,
+        })
+    }
+}
+
+impl TransformerController {
+    /// The weights from (numbers, one-hot position) to tokens and to their first projections.
+    fn compose<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        embedding: Linear,
+        projection: Linear,
+    ) -> Result<Embedding, AutogradError> {
+        let (u, d) = self.positions.dim();
+        let (weight, bias) = (tape.block(embedding.weight), tape.block(embedding.bias));
+        let channels = tape.shape(weight)[1];
+        let transposed: Vec<f64> = self.positions.t().iter().copied().collect();
+        let positions = constant(tape, &[d, u], &transposed);
+        let bias = tape.reshape(bias, &[d, 1])?;
+        let positions = tape.add(positions, bias)?;
+        let token = tape.concat(&[weight, positions])?;
+
+        let (weight, bias) = (tape.block(projection.weight), tape.block(projection.bias));
+        let projected = tape.matmul(weight, token)?;
+        // The bias goes where the position's one is.
+        let mut mask = vec![0.0; channels];
+        mask.resize(channels + u, 1.0);
+        let mask = constant(tape, &[1, channels + u], &mask);
+        let bias = tape.reshape(bias, &[3 * d, 1])?;
+        let bias = tape.mul(bias, mask)?;
+        let projections = tape.add(projected, bias)?;
+        Ok(Embedding { token, projections })
+    }
+
+    /// Codes target segments `[rows, c + u]`: the encoder's output and the decoders' keys and values of it.
+    fn encode<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        embedding: Embedding,
+        segments: Var,
+        u: usize,
+    ) -> Result<(Var, Vec<Var>), AutogradError> {
+        let x = tape.linear(segments, embedding.token, None, false)?;
+        let projected = tape.linear(segments, embedding.projections, None, false)?;
+        let mut x = self.encoder[0].forward_projected(tape, x, projected, u)?;
+        for layer in &self.encoder[1..] {
+            x = layer.forward(tape, x, u)?;
+        }
+        let (_, before_last) = self.split_decoder();
+        let projected = before_last
+            .iter()
+            .map(|layer| layer.project_memory(tape, x))
+            .collect::<Result<_, _>>()?;
+        Ok((x, projected))
+    }
+
+    /// The last decoder layer and those before it.
+    fn split_decoder(&self) -> (&TransformerDecoderLayer, &[TransformerDecoderLayer]) {
+        let last = self.decoder.len() - 1;
+        (&self.decoder[last], &self.decoder[..last])
+    }
+
+    /// Decodes mixture segments `[windows * u, c + u]` against the memory of the same frame; the code is `[windows, d]`.
+    fn decode<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        embedding: Embedding,
+        segments: Var,
+        memory: Var,
+        projected_memory: &[Var],
+    ) -> Result<Var, AutogradError> {
+        let u = self.positions.nrows();
+        let (last, before_last) = self.split_decoder();
+        let mut x = tape.linear(segments, embedding.token, None, false)?;
+        for (k, (layer, &memory)) in before_last.iter().zip(projected_memory).enumerate() {
+            let projected = if k == 0 {
+                tape.linear(segments, embedding.projections, None, false)?
+            } else {
+                layer.self_attention.project(tape, x)?
+            };
+            x = layer.forward_projected(tape, x, projected, memory, u)?;
+        }
+        let x = last.forward_single(tape, x, memory, u, u / 2)?;
+        self.output.forward(tape, x)
+    }
+}
+
+impl<T: Real> Session<'_, T> {
+    /// Frame of segment position `j` for the prediction of frame `t + 1`.
+    fn segment_frame(&self, t: usize, j: usize) -> usize {
+        (t + 1 + j)
+            .saturating_sub(self.controller.window / 2)
+            .min(self.trajectory.frames - 1)
+    }
+
+    /// How many of the last fed frames a mixture segment holds.
+    pub(super) fn past(window: usize) -> usize {
+        window / 2
+    }
+
+    /// The code for the prediction of frame `t + 1`, `[windows, d]`. `fed(i)` is what was fed for frame i, `[windows, c]`,
+    /// asked for the last `past` frames up to t.
+    pub(super) fn code(
+        &mut self,
+        tape: &mut Tape<'_, T>,
+        t: usize,
+        fed: impl Fn(usize) -> Var,
+    ) -> Result<Var, AutogradError> {
+        let (u, c) = (self.controller.window, self.controller.channels);
+        let windows = self.trajectory.windows;
+        let mut mixture = Vec::with_capacity(u);
+        for j in 0..u {
+            let frame = self.segment_frame(t, j);
+            mixture.push(if frame <= t {
+                fed(frame)
+            } else {
+                let values = self.trajectory.frame(frame);
+                tape.constant_with(&[windows, c], |out| out.copy_from_slice(values))
+            });
+        }
+        match &self.controller.kind {
+            Kind::FullyConnected(mlp) => {
+                let target = tape.constant_with(&[windows, u * c], |out| {
+                    self.write_segments(t, out, 0);
+                });
+                let mut parts = vec![target];
+                parts.append(&mut mixture);
+                let segments = tape.concat(&parts)?;
+                mlp.forward(tape, segments)
+            }
+            Kind::Transformer(transformer) => {
+                self.remember(tape, transformer, t)?;
+                let (Some(composed), Some(memory)) = (&self.composed, &self.memory) else {
+                    unreachable!("a Transformer controller has both");
+                };
+                let parts: Vec<Var> = mixture
+                    .into_iter()
+                    .zip(&composed.one_hot)
+                    .flat_map(|(values, &one_hot)| [values, one_hot])
+                    .collect();
+                let segments = tape.concat(&parts)?;
+                let segments = tape.reshape(segments, &[windows * u, c + u])?;
+                let mut of_frame = |all: Var| {
+                    if memory.frames == 1 {
+                        return Ok(all);
+                    }
+                    let from = (t - memory.first) * windows * u;
+                    tape.rows(all, from..from + windows * u)
+                };
+                let tokens = of_frame(memory.tokens)?;
+                let projected = memory
+                    .projected
+                    .iter()
+                    .map(|&all| of_frame(all))
+                    .collect::<Result<Vec<_>, _>>()?;
+                transformer.decode(tape, composed.mixture, segments, tokens, &projected)
+            }
+        }
+    }
+
+    /// Writes the target segments of all windows for the prediction of frame `t + 1`, each token followed by `gap` numbers that
+    /// are left alone.
+    fn write_segments(&self, t: usize, out: &mut [T], gap: usize) {
+        let (u, c) = (self.controller.window, self.controller.channels);
+        for (window, out) in out.chunks_exact_mut(u * (c + gap)).enumerate() {
+            for (j, token) in out.chunks_exact_mut(c + gap).enumerate() {
+                let frame = self.trajectory.frame(self.segment_frame(t, j));
+                token[..c].copy_from_slice(&frame[window * c..(window + 1) * c]);
+            }
+        }
+    }
+
+    /// Codes the target segments for the prediction of frame `t + 1`, and of some frames after it where windows are few.
+    fn remember(
+        &mut self,
+        tape: &mut Tape<'_, T>,
+        transformer: &TransformerController,
+        t: usize,
+    ) -> Result<(), AutogradError> {
+        if let Some(memory) = &self.memory
+            && (memory.first..memory.first + memory.frames).contains(&t)
+        {
+            return Ok(());
+        }
+        let Some(composed) = &self.composed else {
+            return Ok(());
+        };
+        let (u, c) = (self.controller.window, self.controller.channels);
+        let windows = self.trajectory.windows;
+        let left = self.trajectory.frames - 1 - t;
+        let frames = (WINDOWS_AT_ONCE / windows.max(1)).clamp(1, left.max(1));
+        let rows = windows * u;
+        let segments = tape.constant_with(&[frames * rows, c + u], |out| {
+            out.fill(T::zero());
+            let width = rows * (c + u);
+            for (k, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+                self.write_segments(t + k, out, u);
+            }
+            for (row, token) in out.chunks_exact_mut(c + u).enumerate() {
+                token[c + row % u] = T::one();
+            }
+        });
+        let (tokens, projected) = transformer.encode(tape, composed.target, segments, u)?;
+        self.memory = Some(Memory {
+            first: t,
+            frames,
+            tokens,
+            projected,
+        });
+        Ok(())
+    }
+
+    /// The values on the tape that later frames need.
+    pub(super) fn keep(&mut self) -> impl Iterator<Item = &mut Var> {
+        self.memory
+            .iter_mut()
+            .flat_map(|memory| std::iter::once(&mut memory.tokens).chain(&mut memory.projected))
+    }
+}

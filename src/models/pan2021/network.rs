@@ -1,0 +1,393 @@
+//! The motion synthesis network (figure 2): one frame after the other.
+
+use ndarray::Array3;
+use rand::Rng;
+
+use super::config::Pan2021Config;
+use super::controller::{Controller, Session, Trajectory};
+use super::losses;
+use super::units::{Units, VELOCITIES};
+use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::data::Standardisation;
+use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
+use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::nn::{Initialiser, Lstm, Mlp};
+
+/// Numbers of the state encoder's input: p^b, p^r, o^r, c.
+const STATE: std::ops::Range<usize> = 0..77;
+/// Numbers of a keyframe: p^b, p^r, o^r.
+const KEYFRAME: std::ops::Range<usize> = 0..FACING.end;
+/// What the state decoder gives where there is a root decoder: p^b, c, v^b.
+const DECODED_STATE: usize = 69 + 4 + 69;
+/// What the root decoder gives: p^r, o^r, v^r.
+const DECODED_ROOT: usize = 3 + 1 + 3;
+
+/// The network of Pan et al. 2021 and its ablations.
+#[derive(Debug, Clone)]
+pub struct Pan2021 {
+    config: Pan2021Config,
+    units: Units,
+    state_encoder: Mlp,
+    velocity_encoder: Mlp,
+    target_controller: Mlp,
+    position_encoder: Mlp,
+    root_trajectory_controller: Controller,
+    velocity_factor_controller: Option<Controller>,
+    lstm: Backbone,
+    state_decoder: Mlp,
+    root_decoder: Option<Mlp>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Backbone {
+    One(Lstm),
+    Two(Lstm, Lstm),
+}
+
+/// What was fed for one frame.
+#[derive(Debug, Clone, Copy)]
+struct Fed {
+    /// `[windows, 149]`
+    frame: Var,
+    /// p^r, `[windows, 3]`
+    root: Var,
+    /// f, `[windows, 5]`, where the network has a velocity factor controller.
+    factors: Option<Var>,
+}
+
+impl Pan2021 {
+    /// Builds the network and adds its weights.
+    ///
+    /// # Errors
+    /// A config whose fields do not fit together.
+    pub fn new<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        config: &Pan2021Config,
+        standardisation: &Standardisation,
+    ) -> Result<Self, ModelError> {
+        config.check()?;
+        let (wide, code) = (config.hidden, config.code);
+        let state_encoder = Mlp::new(init, "state_encoder", &[STATE.len(), wide, code], true);
+        let velocity_encoder = Mlp::new(
+            init,
+            "velocity_encoder",
+            &[VELOCITIES.len(), wide, code],
+            true,
+        );
+        let target_controller = Mlp::new(
+            init,
+            "target_controller",
+            &[KEYFRAME.len(), wide, code],
+            true,
+        );
+        let codes = if config.velocity_factor { 4 } else { 3 };
+        let last_input = match config.lstms {
+            1 => (codes + 1) * code,
+            _ => 2 * code,
+        };
+        let position_encoder = Mlp::new(init, "position_encoder", &[4, last_input], true);
+        let root_trajectory_controller =
+            Controller::new(init, "root_trajectory_controller", 3, config);
+        let velocity_factor_controller = config.velocity_factor.then(|| {
+            let channels = VELOCITY_FACTORS.len();
+            Controller::new(init, "velocity_factor_controller", channels, config)
+        });
+        let lstm = match config.lstms {
+            1 => Backbone::One(Lstm::new(init, "lstm", last_input, code)),
+            _ => Backbone::Two(
+                Lstm::new(init, "lstm1", codes * code, code),
+                Lstm::new(init, "lstm2", last_input, code),
+            ),
+        };
+        let decoder = |init: &mut Initialiser<'_, T, R>, name: &str, outputs: usize| {
+            Mlp::new(init, name, &[code, wide, code, outputs], false)
+        };
+        let (state_decoder, root_decoder) = match config.decoders {
+            1 => (decoder(init, "state_decoder", FRAME), None),
+            _ => (
+                decoder(init, "state_decoder", DECODED_STATE),
+                Some(decoder(init, "root_decoder", DECODED_ROOT)),
+            ),
+        };
+        Ok(Self {
+            config: config.clone(),
+            units: Units::new(standardisation),
+            state_encoder,
+            velocity_encoder,
+            target_controller,
+            position_encoder,
+            root_trajectory_controller,
+            velocity_factor_controller,
+            lstm,
+            state_decoder,
+            root_decoder,
+        })
+    }
+
+    fn start<'n, 'f, T: Real>(
+        &'n self,
+        tape: &mut Tape<'_, T>,
+        features: &'f Array3<T>,
+    ) -> Result<Rollout<'n, 'f, T>, AutogradError> {
+        let (frames, windows, numbers) = features.dim();
+        let values = match features.as_slice() {
+            Some(values) if frames >= 2 && numbers == FEATURES => values,
+            _ => {
+                return Err(AutogradError::Argument {
+                    operation: "pan2021",
+                    shape: features.shape().to_vec(),
+                    argument: "the features of a batch".into(),
+                    expected: "[N + 1, windows, 154] in standard layout, N at least 1",
+                });
+            }
+        };
+        let trajectory = |columns: std::ops::Range<usize>| Trajectory {
+            values: values
+                .chunks_exact(FEATURES)
+                .flat_map(|frame| frame[columns.clone()].iter().copied())
+                .collect(),
+            frames,
+            windows,
+        };
+        let keyframe = gather(tape, values, windows, frames - 1, KEYFRAME);
+        let target_code = self.target_controller.forward(tape, keyframe)?;
+        let root = self
+            .root_trajectory_controller
+            .start(tape, trajectory(ROOT_POSITION))?;
+        let factors = match &self.velocity_factor_controller {
+            Some(controller) => Some(controller.start(tape, trajectory(VELOCITY_FACTORS))?),
+            None => None,
+        };
+        let states = match &self.lstm {
+            Backbone::One(lstm) => vec![lstm.start(tape, windows)],
+            Backbone::Two(first, second) => {
+                vec![first.start(tape, windows), second.start(tape, windows)]
+            }
+        };
+        Ok(Rollout {
+            network: self,
+            values,
+            windows,
+            transition: frames - 1,
+            target_code,
+            states,
+            root,
+            factors,
+            past: Vec::new(),
+        })
+    }
+}
+
+/// Columns of frame `frame` of `[frames, windows, 154]`, as a constant `[windows, columns]`.
+fn gather<T: Real>(
+    tape: &mut Tape<'_, T>,
+    values: &[T],
+    windows: usize,
+    frame: usize,
+    columns: std::ops::Range<usize>,
+) -> Var {
+    let rows = &values[frame * windows * FEATURES..(frame + 1) * windows * FEATURES];
+    tape.constant_with(&[windows, columns.len()], |out| {
+        for (out, row) in out
+            .chunks_exact_mut(columns.len())
+            .zip(rows.chunks_exact(FEATURES))
+        {
+            out.copy_from_slice(&row[columns.clone()]);
+        }
+    })
+}
+
+/// The network at work on the windows of one batch.
+struct Rollout<'n, 'f, T> {
+    network: &'n Pan2021,
+    /// `[N + 1, windows, 154]`
+    values: &'f [T],
+    windows: usize,
+    /// N
+    transition: usize,
+    target_code: Var,
+    states: Vec<Var>,
+    root: Session<'n, T>,
+    factors: Option<Session<'n, T>>,
+    /// The last frames fed, the latest at the end, with their index.
+    past: Vec<(usize, Fed)>,
+}
+
+impl<T: Real> Rollout<'_, '_, T> {
+    /// Feeds the true frame `t`.
+    fn feed_truth(&mut self, tape: &mut Tape<'_, T>, t: usize) {
+        let fed = Fed {
+            frame: gather(tape, self.values, self.windows, t, 0..FRAME),
+            root: gather(tape, self.values, self.windows, t, ROOT_POSITION),
+            factors: self
+                .factors
+                .is_some()
+                .then(|| gather(tape, self.values, self.windows, t, VELOCITY_FACTORS)),
+        };
+        self.feed(t, fed);
+    }
+
+    /// Feeds a predicted frame `t`, `[windows, 149]`.
+    fn feed_prediction(
+        &mut self,
+        tape: &mut Tape<'_, T>,
+        t: usize,
+        frame: Var,
+    ) -> Result<(), AutogradError> {
+        let factors = match self.factors {
+            None => None,
+            Some(_) => {
+                let velocities = tape.columns(frame, VELOCITIES)?;
+                let velocities = self.network.units.velocities(tape, velocities)?;
+                Some(self.network.units.velocity_factors(tape, velocities)?)
+            }
+        };
+        let root = tape.columns(frame, ROOT_POSITION)?;
+        let fed = Fed {
+            frame,
+            root,
+            factors,
+        };
+        self.feed(t, fed);
+        Ok(())
+    }
+
+    fn feed(&mut self, t: usize, fed: Fed) {
+        let past = Session::<T>::past(self.network.config.window).max(1);
+        if self.past.len() == past {
+            self.past.remove(0);
+        }
+        self.past.push((t, fed));
+    }
+
+    /// Predicts frame `t + 1`, standardised `[windows, 149]`, from what was fed up to frame t.
+    fn step(&mut self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
+        let network = self.network;
+        let past = self.past.clone();
+        let fed = |frame: usize| -> Fed {
+            past.iter()
+                .find(|(index, _)| *index == frame)
+                .or(past.first())
+                .map(|&(_, fed)| fed)
+                .expect("frame t is fed before frame t + 1 is predicted")
+        };
+        let now = fed(t);
+        let state = tape.columns(now.frame, STATE)?;
+        let state = network.state_encoder.forward(tape, state)?;
+        let velocity = tape.columns(now.frame, VELOCITIES)?;
+        let velocity = network.velocity_encoder.forward(tape, velocity)?;
+        let mut codes = vec![state, velocity];
+        codes.push(self.root.code(tape, t, |frame| fed(frame).root)?);
+        if let Some(session) = &mut self.factors {
+            codes.push(session.code(tape, t, |frame| {
+                let fed = fed(frame);
+                fed.factors.unwrap_or(fed.root)
+            })?);
+        }
+        let position = self.position_code(tape, t)?;
+        let hidden = match &network.lstm {
+            Backbone::One(lstm) => {
+                codes.push(self.target_code);
+                let input = tape.concat(&codes)?;
+                let input = tape.add(input, position)?;
+                let (hidden, state) = lstm.step(tape, input, self.states[0])?;
+                self.states[0] = state;
+                hidden
+            }
+            Backbone::Two(first, second) => {
+                let input = tape.concat(&codes)?;
+                let (hidden, state) = first.step(tape, input, self.states[0])?;
+                self.states[0] = state;
+                let input = tape.concat(&[hidden, self.target_code])?;
+                let input = tape.add(input, position)?;
+                let (hidden, state) = second.step(tape, input, self.states[1])?;
+                self.states[1] = state;
+                hidden
+            }
+        };
+        let decoded = network.state_decoder.forward(tape, hidden)?;
+        let Some(root_decoder) = &network.root_decoder else {
+            return Ok(decoded);
+        };
+        let root = root_decoder.forward(tape, hidden)?;
+        let parts = [
+            tape.columns(decoded, 0..69)?,
+            tape.columns(root, 0..4)?,
+            tape.columns(decoded, 69..DECODED_STATE)?,
+            tape.columns(root, 4..DECODED_ROOT)?,
+        ];
+        tape.concat(&parts)
+    }
+
+    /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 - k1) (eq. 2).
+    fn position_code(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
+        let root = gather(tape, self.values, self.windows, t + 1, ROOT_POSITION);
+        let arrival = T::from_f64((t + 1) as f64 / self.transition as f64);
+        let arrival = tape.constant_with(&[self.windows, 1], |out| out.fill(arrival));
+        let input = tape.concat(&[root, arrival])?;
+        self.network.position_encoder.forward(tape, input)
+    }
+
+    /// The values on the tape that later frames need.
+    fn keep(&mut self) -> Vec<&mut Var> {
+        let mut keep: Vec<&mut Var> = self.states.iter_mut().collect();
+        for (_, fed) in &mut self.past {
+            keep.extend([&mut fed.frame, &mut fed.root]);
+            keep.extend(fed.factors.as_mut());
+        }
+        keep.extend(self.root.keep());
+        if let Some(session) = &mut self.factors {
+            keep.extend(session.keep());
+        }
+        keep
+    }
+}
+
+impl<T: Real> Network<T> for Pan2021 {
+    fn losses(
+        &self,
+        tape: &mut Tape<'_, T>,
+        batch: &Batch<T>,
+        feed: Feed,
+    ) -> Result<LossTerms, AutogradError> {
+        let mut rollout = self.start(tape, &batch.features)?;
+        let first = gather(tape, rollout.values, rollout.windows, 0, 0..FRAME);
+        let mut frames = vec![first];
+        rollout.feed_truth(tape, 0);
+        for t in 0..rollout.transition {
+            let frame = rollout.step(tape, t)?;
+            frames.push(frame);
+            match feed {
+                Feed::GroundTruth => rollout.feed_truth(tape, t + 1),
+                Feed::Predictions => rollout.feed_prediction(tape, t + 1, frame)?,
+            }
+        }
+        losses::terms(tape, &self.units, &self.config, batch, &frames)
+    }
+
+    fn predict(
+        &self,
+        tape: &mut Tape<'_, T>,
+        features: &Array3<T>,
+    ) -> Result<Array3<T>, AutogradError> {
+        let mut rollout = self.start(tape, features)?;
+        let (transition, windows) = (rollout.transition, rollout.windows);
+        let mut predicted = Vec::with_capacity(transition * windows * FRAME);
+        rollout.feed_truth(tape, 0);
+        let mark = tape.mark();
+        for t in 0..transition {
+            let frame = rollout.step(tape, t)?;
+            predicted.extend_from_slice(tape.values(frame));
+            rollout.feed_prediction(tape, t + 1, frame)?;
+            tape.forget_since(mark, &mut rollout.keep());
+        }
+        Array3::from_shape_vec((transition, windows, FRAME), predicted).map_err(|_| {
+            AutogradError::Argument {
+                operation: "pan2021",
+                shape: features.shape().to_vec(),
+                argument: "the predicted frames".into(),
+                expected: "149 numbers a frame",
+            }
+        })
+    }
+}

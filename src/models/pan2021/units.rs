@@ -1,0 +1,217 @@
+//! From standardised numbers to centimetres on the tape: velocity factors, bone vectors, foot velocities.
+
+use glam::DVec3;
+use ndarray::Array2;
+
+use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::data::Standardisation;
+use crate::motion::features::{
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, ROOT_VELOCITY, VELOCITY_FACTORS,
+};
+use crate::motion::velocity_factor::{PART_WEIGHTS, PARTS};
+use crate::motion::{DANCE_PARENTS, JOINTS};
+
+/// Keeps the gradient of a norm finite at 0; in the square of the quantity's own unit.
+pub(super) const NORM_EPS: f64 = 1e-8;
+/// LeftFoot, LeftToeBase, RightFoot, RightToeBase, as the contact labels.
+const FEET: [usize; 4] = [3, 4, 7, 8];
+/// Numbers of v^b and v^r.
+pub(super) const VELOCITIES: std::ops::Range<usize> = BODY_VELOCITIES.start..ROOT_VELOCITY.end;
+
+/// An affine map of standardised numbers, `[out, in]` and `[out]`.
+#[derive(Debug, Clone)]
+struct Affine {
+    weight: Array2<f64>,
+    bias: Vec<f64>,
+}
+
+impl Affine {
+    fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
+        let (outputs, inputs) = self.weight.dim();
+        let weight = tape.constant_with(&[outputs, inputs], |out| {
+            for (out, &x) in out.iter_mut().zip(self.weight.iter()) {
+                *out = T::from_f64(x);
+            }
+        });
+        let bias = constant(tape, &[outputs], &self.bias);
+        tape.linear(x, weight, Some(bias), false)
+    }
+}
+
+/// A constant from f64 numbers.
+pub(super) fn constant<T: Real>(tape: &mut Tape<'_, T>, shape: &[usize], values: &[f64]) -> Var {
+    tape.constant_with(shape, |out| {
+        for (out, &x) in out.iter_mut().zip(values) {
+            *out = T::from_f64(x);
+        }
+    })
+}
+
+/// What of a data set's statistics the network computes with.
+#[derive(Debug, Clone)]
+pub(super) struct Units {
+    /// Standard deviation and mean of v^b, v^r (72).
+    velocity_std: Vec<f64>,
+    velocity_mean: Vec<f64>,
+    /// Standard deviation of p^b, p^r (72).
+    pub(super) position_std: Vec<f64>,
+    /// Mean of p^b (69).
+    body_mean: Vec<f64>,
+    pub(super) contact_std: Vec<f64>,
+    pub(super) contact_mean: Vec<f64>,
+    /// Speeds of joints 1 .. 23 and the root, `[24]`, to standardised velocity factors `[5]` (eq. 1).
+    factors: Affine,
+    /// p^b standardised to the vectors of the 23 bones, `[69]`, cm.
+    bones: Affine,
+    /// v^b standardised to the velocities of the four foot joints, `[12]`, cm/frame.
+    feet: Affine,
+    pub(super) position_scale: f64,
+    pub(super) velocity_scale: f64,
+}
+
+impl Units {
+    pub(super) fn new(standardisation: &Standardisation) -> Self {
+        let (mean, std) = (&standardisation.mean, &standardisation.std);
+        let positions = BODY_POSITIONS;
+        let velocities = BODY_VELOCITIES;
+        Self {
+            velocity_std: std[VELOCITIES].to_vec(),
+            velocity_mean: mean[VELOCITIES].to_vec(),
+            position_std: std[..VELOCITIES.len()].to_vec(),
+            body_mean: mean[BODY_POSITIONS].to_vec(),
+            contact_std: std[CONTACTS].to_vec(),
+            contact_mean: mean[CONTACTS].to_vec(),
+            factors: factor_map(&mean[VELOCITY_FACTORS], &std[VELOCITY_FACTORS]),
+            bones: restored(&bone_map(), &mean[positions.clone()], &std[positions]),
+            feet: restored(&foot_map(), &mean[velocities.clone()], &std[velocities]),
+            position_scale: standardisation.position_scale,
+            velocity_scale: standardisation.velocity_scale,
+        }
+    }
+
+    /// p^b in cm of one standardised frame.
+    pub(super) fn body_positions(&self, frame: &[f64]) -> Vec<f64> {
+        BODY_POSITIONS
+            .map(|i| frame[i] * self.position_std[i] + self.body_mean[i])
+            .collect()
+    }
+
+    /// Velocities in cm/frame from standardised ones, `[.., 72]`.
+    pub(super) fn velocities<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        standardised: Var,
+    ) -> Result<Var, AutogradError> {
+        let n = self.velocity_std.len();
+        let std = constant(tape, &[n], &self.velocity_std);
+        let mean = constant(tape, &[n], &self.velocity_mean);
+        let scaled = tape.mul(standardised, std)?;
+        tape.add(scaled, mean)
+    }
+
+    /// Eq. 1 on velocities in cm/frame `[rows, 72]`: standardised velocity factors `[rows, 5]`.
+    pub(super) fn velocity_factors<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        velocities: Var,
+    ) -> Result<Var, AutogradError> {
+        let rows = tape.shape(velocities)[0];
+        let joints = tape.reshape(velocities, &[rows, JOINTS, 3])?;
+        let speeds = tape.vector_norm(joints, NORM_EPS)?;
+        self.factors.forward(tape, speeds)
+    }
+
+    /// Lengths of the 23 bones, `[rows, 23]`, cm, from standardised p^b `[rows, 69]`; the root is at 0.
+    pub(super) fn bone_lengths<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        positions: Var,
+    ) -> Result<Var, AutogradError> {
+        let vectors = self.bones.forward(tape, positions)?;
+        norms(tape, vectors, JOINTS - 1)
+    }
+
+    /// Speeds of the four foot joints, `[rows, 4]`, cm/frame, from standardised v^b `[rows, 69]`.
+    pub(super) fn foot_speeds<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        velocities: Var,
+    ) -> Result<Var, AutogradError> {
+        let vectors = self.feet.forward(tape, velocities)?;
+        norms(tape, vectors, FEET.len())
+    }
+}
+
+fn norms<T: Real>(tape: &mut Tape<'_, T>, x: Var, vectors: usize) -> Result<Var, AutogradError> {
+    let rows = tape.shape(x)[0];
+    let x = tape.reshape(x, &[rows, vectors, 3])?;
+    tape.vector_norm(x, NORM_EPS)
+}
+
+fn factor_map(mean: &[f64], std: &[f64]) -> Affine {
+    let mut weight = Array2::zeros((PARTS, JOINTS));
+    for (part, joints) in PART_WEIGHTS.iter().enumerate() {
+        let sum: f64 = joints.iter().map(|(_, w)| w).sum();
+        for &(joint, w) in *joints {
+            // The root's velocity stands behind the others'.
+            let column = if joint == 0 { JOINTS - 1 } else { joint - 1 };
+            weight[[part, column]] = w / sum / std[part];
+        }
+    }
+    let bias = mean.iter().zip(std).map(|(m, s)| -m / s).collect();
+    Affine { weight, bias }
+}
+
+/// Each bone's vector from the joints' positions, `[69, 69]`.
+fn bone_map() -> Array2<f64> {
+    let mut map = Array2::zeros((3 * (JOINTS - 1), 3 * (JOINTS - 1)));
+    for joint in 1..JOINTS {
+        for axis in 0..3 {
+            let row = 3 * (joint - 1) + axis;
+            map[[row, row]] = 1.0;
+            if let Some(parent) = DANCE_PARENTS[joint].filter(|&parent| parent > 0) {
+                map[[row, 3 * (parent - 1) + axis]] = -1.0;
+            }
+        }
+    }
+    map
+}
+
+/// The foot joints' numbers, `[12, 69]`.
+fn foot_map() -> Array2<f64> {
+    let mut map = Array2::zeros((3 * FEET.len(), 3 * (JOINTS - 1)));
+    for (k, joint) in FEET.into_iter().enumerate() {
+        for axis in 0..3 {
+            map[[3 * k + axis, 3 * (joint - 1) + axis]] = 1.0;
+        }
+    }
+    map
+}
+
+/// `map` applied to restored numbers: x std + mean.
+fn restored(map: &Array2<f64>, mean: &[f64], std: &[f64]) -> Affine {
+    let mut weight = map.clone();
+    for mut row in weight.rows_mut() {
+        row.iter_mut().zip(std).for_each(|(w, s)| *w *= s);
+    }
+    let bias = map
+        .rows()
+        .into_iter()
+        .map(|row| row.iter().zip(mean).map(|(w, m)| w * m).sum())
+        .collect();
+    Affine { weight, bias }
+}
+
+/// Lengths of the 23 bones of one frame's p^b (cm).
+pub(super) fn lengths_of(positions: &[f64]) -> Vec<f64> {
+    let at = |joint: usize| match joint {
+        0 => DVec3::ZERO,
+        _ => DVec3::from_slice(&positions[3 * (joint - 1)..]),
+    };
+    (1..JOINTS)
+        .map(|joint| {
+            let parent = DANCE_PARENTS[joint].unwrap_or(0);
+            ((at(joint) - at(parent)).length_squared() + NORM_EPS).sqrt()
+        })
+        .collect()
+}

@@ -1,0 +1,150 @@
+//! A network with its weights and statistics, as a model of transitions.
+
+use std::sync::Mutex;
+
+use ndarray::{Array2, Array3, s};
+
+use super::{ModelError, Network, Transition, TransitionModel, TransitionRequest};
+use crate::autograd::{Parameters, Tape, Workspace};
+use crate::data::Standardisation;
+use crate::data::window::wrap;
+use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS};
+
+/// A trained network, in f32.
+pub struct TrainedModel {
+    name: String,
+    network: Box<dyn Network<f32>>,
+    parameters: Parameters<f32>,
+    standardisation: Standardisation,
+    workspaces: Mutex<Vec<Workspace<f32>>>,
+}
+
+impl TrainedModel {
+    /// `parameters` are those that `network` was built with.
+    pub fn new(
+        name: String,
+        network: Box<dyn Network<f32>>,
+        parameters: Parameters<f32>,
+        standardisation: Standardisation,
+    ) -> Self {
+        Self {
+            name,
+            network,
+            parameters,
+            standardisation,
+            workspaces: Mutex::new(Vec::new()),
+        }
+    }
+
+    pub fn parameters(&self) -> &Parameters<f32> {
+        &self.parameters
+    }
+
+    pub fn standardisation(&self) -> &Standardisation {
+        &self.standardisation
+    }
+
+    /// The network's inputs for requests of one length, `[N + 1, windows, 154]`, standardised; what is not given is 0.
+    fn inputs(&self, requests: &[&TransitionRequest], length: usize) -> Array3<f32> {
+        let mut features = Array3::zeros((length + 1, requests.len(), FEATURES));
+        let standardise = |value: f64, number: usize| {
+            ((value - self.standardisation.mean[number]) / self.standardisation.std[number]) as f32
+        };
+        for (window, request) in requests.iter().enumerate() {
+            // As in training, the first frame faces within [-pi, pi) and the angle runs on from there.
+            let facing = request.start.features[FACING.start];
+            let shift = wrap(facing) - facing;
+            for (row, keyframe) in [(0, &request.start), (length, &request.target)] {
+                for number in 0..FEATURES {
+                    let shift = if number == FACING.start { shift } else { 0.0 };
+                    let value = keyframe.features[number] + shift;
+                    features[[row, window, number]] = standardise(value, number);
+                }
+            }
+            for row in 0..=length {
+                for (columns, given) in [
+                    (ROOT_POSITION, &request.root_trajectory),
+                    (VELOCITY_FACTORS, &request.velocity_factors),
+                ] {
+                    for (k, number) in columns.enumerate() {
+                        features[[row, window, number]] = standardise(given[[row, k]], number);
+                    }
+                }
+            }
+        }
+        features
+    }
+
+    fn predict(
+        &self,
+        requests: &[&TransitionRequest],
+        length: usize,
+    ) -> Result<Vec<Transition>, ModelError> {
+        let inputs = self.inputs(requests, length);
+        let mut workspace = self
+            .workspaces
+            .lock()
+            .map(|mut free| free.pop())
+            .unwrap_or_default()
+            .unwrap_or_else(Workspace::new);
+        let predicted = {
+            let mut tape = Tape::inference(&self.parameters, &mut workspace);
+            self.network.predict(&mut tape, &inputs)
+        }
+        .map_err(|error| ModelError::Model {
+            model: self.name.clone(),
+            reason: error.to_string(),
+        })?;
+        if let Ok(mut free) = self.workspaces.lock() {
+            free.push(workspace);
+        }
+        let mut transitions = Vec::with_capacity(requests.len());
+        for (window, request) in requests.iter().enumerate() {
+            let facing = request.start.features[FACING.start];
+            let shift = wrap(facing) - facing;
+            let mut frames = Array2::zeros((length, FRAME));
+            for (mut out, row) in frames
+                .rows_mut()
+                .into_iter()
+                .zip(predicted.slice(s![.., window, ..]).rows())
+            {
+                for number in 0..FRAME {
+                    out[number] = f64::from(row[number]) * self.standardisation.std[number]
+                        + self.standardisation.mean[number];
+                }
+                out[FACING.start] -= shift;
+            }
+            let transition = Transition { frames };
+            transition.check(length)?;
+            transitions.push(transition);
+        }
+        Ok(transitions)
+    }
+}
+
+impl TransitionModel for TrainedModel {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
+        for request in requests {
+            request.check()?;
+        }
+        let mut lengths: Vec<usize> = requests.iter().map(TransitionRequest::length).collect();
+        lengths.sort_unstable();
+        lengths.dedup();
+        let mut results: Vec<Option<Transition>> = vec![None; requests.len()];
+        for length in lengths {
+            let (places, of_length): (Vec<usize>, Vec<&TransitionRequest>) = requests
+                .iter()
+                .enumerate()
+                .filter(|(_, request)| request.length() == length)
+                .unzip();
+            for (place, transition) in places.into_iter().zip(self.predict(&of_length, length)?) {
+                results[place] = Some(transition);
+            }
+        }
+        Ok(results.into_iter().flatten().collect())
+    }
+}

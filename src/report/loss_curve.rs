@@ -1,0 +1,63 @@
+//! The loss curve of a training: the total and its terms over frame-steps.
+
+use super::FigureError;
+use super::chart::{Axis, Chart, Line, Scale};
+
+/// The total loss or one of its terms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LossSeries {
+    /// Its name in the legend, such as `L_rec`.
+    pub name: String,
+    /// `(frame-steps, loss)`: predicted frames that the training had gone through, and the mean loss since the point before.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// At most this many points of a line are drawn; more are averaged in equal runs.
+const POINTS: usize = 300;
+
+/// Draws losses over frame-steps, the first series as the total; the loss axis is logarithmic, and a loss of 0 has no place on it.
+///
+/// `title` stands above, such as "whole_model, 1.2 M frame-steps".
+///
+/// # Errors
+///
+/// [`FigureError`]: no positive loss at all, or one that is NaN or infinite.
+pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureError> {
+    let lines = series.iter().enumerate().map(|(index, series)| Line {
+        name: series.name.clone(),
+        points: thinned(&series.points),
+        emphasised: index == 0,
+        dashed: false,
+        dots: false,
+        colour: index,
+    });
+    Chart {
+        title: title.to_string(),
+        x: Axis {
+            label: "training (frame-steps)".into(),
+            scale: Scale::Linear,
+            from_zero: true,
+        },
+        y: Axis {
+            label: "loss (standardised units, log scale)".into(),
+            scale: Scale::Logarithmic,
+            from_zero: false,
+        },
+        lines: lines.collect(),
+    }
+    .svg()
+}
+
+/// Means of equal runs of points, at most [`POINTS`] of them.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    points
+        .chunks(points.len().div_ceil(POINTS).max(1))
+        .map(|run| {
+            let count = run.len() as f64;
+            let (x, y) = run
+                .iter()
+                .fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
+            (x / count, y / count)
+        })
+        .collect()
+}

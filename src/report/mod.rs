@@ -1,0 +1,32 @@
+//! Figures as SVG text: curves of losses and scores, and dancers side by side.
+//!
+//! A figure knows numbers and positions only, no model and no training.
+
+pub mod camera;
+pub mod chart;
+pub mod loss_curve;
+pub mod lrp_curve;
+pub mod motion_figure;
+pub mod svg;
+
+pub use loss_curve::{LossSeries, loss_curve};
+pub use lrp_curve::{LrpSeries, lrp_curve};
+pub use motion_figure::{MotionFigure, MotionRow};
+
+/// Why a figure cannot be drawn.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FigureError {
+    #[error("the figure {figure:?} has nothing to draw: {what}")]
+    Empty { figure: String, what: &'static str },
+    #[error("the figure {figure:?}: {series} has a NaN or an infinity")]
+    NotFinite { figure: String, series: String },
+    #[error(
+        "the figure {figure:?}: {row} has {found} frames, the first row has {expected}; rows show the same frames"
+    )]
+    Frames {
+        figure: String,
+        row: String,
+        found: usize,
+        expected: usize,
+    },
+}

@@ -1,0 +1,196 @@
+//! A small writer of SVG.
+
+use std::fmt::Write;
+
+/// The fonts of all figures, in order of preference.
+const FONTS: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stroke<'a> {
+    /// A CSS colour.
+    pub colour: &'a str,
+    /// In the figure's units.
+    pub width: f64,
+    /// Lengths of dash and gap, as in `stroke-dasharray`; empty for an unbroken line.
+    pub dash: &'a str,
+}
+
+impl<'a> Stroke<'a> {
+    /// An unbroken line.
+    pub fn solid(colour: &'a str, width: f64) -> Self {
+        Self {
+            colour,
+            width,
+            dash: "",
+        }
+    }
+}
+
+/// Which point of a text stands at its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// How a text is set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Font<'a> {
+    /// In the figure's units.
+    pub size: f64,
+    /// A CSS colour.
+    pub colour: &'a str,
+    pub anchor: Anchor,
+    pub bold: bool,
+    /// Turned clockwise about its position, degrees.
+    pub turn: f64,
+}
+
+impl<'a> Font<'a> {
+    /// An upright text in the regular weight.
+    pub fn new(size: f64, colour: &'a str, anchor: Anchor) -> Self {
+        Self {
+            size,
+            colour,
+            anchor,
+            bold: false,
+            turn: 0.0,
+        }
+    }
+}
+
+/// A figure being written: x to the right, y down, in pixels at its natural size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Svg {
+    width: f64,
+    height: f64,
+    body: String,
+}
+
+impl Svg {
+    /// An empty figure on white. `title` is what a screen reader says of it.
+    pub fn new(width: f64, height: f64, title: &str) -> Self {
+        let mut svg = Self {
+            width,
+            height,
+            body: String::new(),
+        };
+        svg.push(format_args!("<title>{}</title>", escape(title)));
+        svg.rectangle([0.0, 0.0], [width, height], "#ffffff");
+        svg
+    }
+
+    /// A filled rectangle with its upper left corner at `corner`.
+    pub fn rectangle(&mut self, corner: [f64; 2], size: [f64; 2], fill: &str) {
+        self.push(format_args!(
+            r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{:.2}" fill="{}"/>"#,
+            corner[0],
+            corner[1],
+            size[0],
+            size[1],
+            escape(fill)
+        ));
+    }
+
+    /// A line through the points with round joins.
+    pub fn line(&mut self, points: &[[f64; 2]], stroke: Stroke) {
+        let mut list = String::new();
+        for [x, y] in points {
+            let _ = write!(list, "{x:.2},{y:.2} ");
+        }
+        let dash = match stroke.dash {
+            "" => String::new(),
+            dash => format!(r#" stroke-dasharray="{}""#, escape(dash)),
+        };
+        self.push(format_args!(
+            r#"<polyline points="{}" fill="none" stroke="{}" stroke-width="{:.2}" stroke-linecap="round" stroke-linejoin="round"{dash}/>"#,
+            list.trim_end(),
+            escape(stroke.colour),
+            stroke.width
+        ));
+    }
+
+    /// An ellipse with half axes `radii`.
+    pub fn ellipse(&mut self, centre: [f64; 2], radii: [f64; 2], fill: &str, stroke: Stroke) {
+        self.push(format_args!(
+            r#"<ellipse cx="{:.2}" cy="{:.2}" rx="{:.2}" ry="{:.2}" fill="{}" stroke="{}" stroke-width="{:.2}"/>"#,
+            centre[0],
+            centre[1],
+            radii[0],
+            radii[1],
+            escape(fill),
+            escape(stroke.colour),
+            stroke.width
+        ));
+    }
+
+    /// A text with its baseline at `position`.
+    pub fn text(&mut self, position: [f64; 2], text: &str, font: Font) {
+        let anchor = match font.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let [x, y] = position;
+        let weight = if font.bold {
+            r#" font-weight="bold""#
+        } else {
+            ""
+        };
+        let turn = match font.turn {
+            0.0 => String::new(),
+            turn => format!(r#" transform="rotate({turn} {x:.2} {y:.2})""#),
+        };
+        self.push(format_args!(
+            r#"<text x="{x:.2}" y="{y:.2}" font-size="{}" fill="{}" text-anchor="{anchor}"{weight}{turn}>{}</text>"#,
+            font.size,
+            escape(font.colour),
+            escape(text)
+        ));
+    }
+
+    /// Opens a group that other programs find by its class; close it with [`Svg::end_group`].
+    pub fn begin_group(&mut self, class: &str) {
+        self.push(format_args!(r#"<g class="{}">"#, escape(class)));
+    }
+
+    /// Closes the group opened last.
+    pub fn end_group(&mut self) {
+        self.push(format_args!("</g>"));
+    }
+
+    /// The whole figure as an SVG document.
+    pub fn finish(self) -> String {
+        let (width, height) = (self.width, self.height);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             font-family=\"{FONTS}\">\n{}</svg>\n",
+            self.body
+        )
+    }
+
+    fn push(&mut self, element: std::fmt::Arguments) {
+        let _ = writeln!(self.body, "{element}");
+    }
+}
+
+/// Text as XML content or attribute value; characters that XML forbids become U+FFFD.
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            other if other.is_control() && !matches!(other, '\t' | '\n' | '\r') => {
+                out.push('\u{fffd}');
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}

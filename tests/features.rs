@@ -1,0 +1,202 @@
+//! The 154 numbers of a frame on motions whose features are known.
+
+#[path = "common/dance_clip.rs"]
+mod dance_clip;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use dance_clip::turning_clip;
+use glam::DVec3;
+use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
+use keydance::motion::features::{
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
+    VELOCITY_FACTORS,
+};
+use keydance::motion::{FeatureConfig, FeatureError, features};
+use ndarray::{Array2, s};
+
+const HIPS: DVec3 = DVec3::new(0.0, 90.0, 0.0);
+
+fn measured(frames: usize, root: impl Fn(usize) -> (DVec3, f64)) -> Array2<f64> {
+    features(
+        &turning_clip("drawn", frames, root),
+        &FeatureConfig::default(),
+    )
+    .unwrap()
+}
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-9
+}
+
+#[test]
+fn the_ranges_follow_each_other_and_fill_the_frame() {
+    let ranges = [
+        BODY_POSITIONS,
+        ROOT_POSITION,
+        FACING,
+        CONTACTS,
+        BODY_VELOCITIES,
+        ROOT_VELOCITY,
+        VELOCITY_FACTORS,
+    ];
+    assert_eq!(
+        ranges.clone().map(|range| range.len()),
+        [69, 3, 1, 4, 69, 3, 5]
+    );
+    assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
+    assert_eq!(VELOCITY_FACTORS.end, FEATURES);
+}
+
+#[test]
+fn the_pose_does_not_depend_on_where_the_dancer_stands_and_looks() {
+    let reference = measured(3, |_| (HIPS, 0.0));
+    assert!(close(reference[[0, FACING.start]], 0.0));
+    // The left hand stretches along +X, the toes point along +Z.
+    assert!(close(reference[[0, 3 * 20]], 70.0) && close(reference[[0, 3 * 3 + 2]], 13.0));
+    for angle in [-3.0, -FRAC_PI_2, 0.3, FRAC_PI_2, 3.0] {
+        let turned = measured(3, |_| (DVec3::new(100.0, 95.0, -30.0), angle));
+        assert!(close(turned[[1, FACING.start]], angle), "{angle}");
+        let apart =
+            &turned.slice(s![.., BODY_POSITIONS]) - &reference.slice(s![.., BODY_POSITIONS]);
+        assert!(
+            apart.iter().all(|&difference| close(difference, 0.0)),
+            "{angle}"
+        );
+        assert_eq!(
+            turned.slice(s![1, ROOT_POSITION]).to_vec(),
+            [100.0, 95.0, -30.0]
+        );
+    }
+}
+
+#[test]
+fn the_facing_angle_counts_turns() {
+    let speed = 0.05;
+    let facing = measured(500, |frame| (HIPS, speed * frame as f64 - 1.0))
+        .column(FACING.start)
+        .to_vec();
+    assert!(
+        facing
+            .windows(2)
+            .all(|pair| (0.0..2.0 * speed).contains(&(pair[1] - pair[0])))
+    );
+    // The held ends bend the smoothed angle; in the middle it is the angle itself.
+    assert!((100..400).all(|frame| (facing[frame] - (speed * frame as f64 - 1.0)).abs() < 1e-3));
+    assert!(facing[499] - facing[0] > 3.0 * TAU);
+    assert!((-PI..=PI).contains(&facing[0]));
+}
+
+#[test]
+fn velocities_are_differences_and_the_first_frame_has_none() {
+    let numbers = measured(10, |frame| {
+        (HIPS + DVec3::new(2.0, 0.0, 0.5) * frame as f64, 0.0)
+    });
+    assert!(
+        numbers
+            .slice(s![0, BODY_VELOCITIES.start..])
+            .iter()
+            .all(|&number| number == 0.0)
+    );
+    for time in 1..10 {
+        let velocity = numbers.slice(s![time, ROOT_VELOCITY]).to_vec();
+        assert!(close(velocity[0], 2.0) && close(velocity[1], 0.0) && close(velocity[2], 0.5));
+        assert!(
+            numbers
+                .slice(s![time, BODY_VELOCITIES])
+                .iter()
+                .all(|&number| close(number, 0.0))
+        );
+        // Only the root moves: the trunk's factor has its weight, 1 of 9.
+        let speed = 4.25f64.sqrt();
+        assert!(close(numbers[[time, VELOCITY_FACTORS.start]], speed / 9.0));
+    }
+}
+
+#[test]
+fn contacts_follow_the_world_and_the_threshold() {
+    let labels = |speed: f64, contact_threshold: f64| {
+        let clip = turning_clip("drawn", 5, |frame| {
+            (HIPS + DVec3::X * speed * frame as f64, 0.0)
+        });
+        let config = FeatureConfig {
+            contact_threshold,
+            ..FeatureConfig::default()
+        };
+        features(&clip, &config)
+            .unwrap()
+            .slice(s![.., CONTACTS])
+            .iter()
+            .copied()
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(labels(0.4, 0.2), [1.0; 20]);
+    assert_eq!(labels(0.5, 0.2), [0.0; 20]);
+    assert_eq!(labels(0.5, 0.3), [1.0; 20]);
+}
+
+#[test]
+fn what_cannot_be_measured_is_an_error() {
+    let clip = turning_clip("drawn", 5, |_| (HIPS, 0.0));
+    let mut other = clip.clone();
+    other.skeleton.joints[9].name = "Chest".into();
+    let expected = FeatureError::NotTheDanceSkeleton {
+        clip: "drawn".into(),
+        index: 9,
+        expected: "Spine on Hips".into(),
+        found: "Chest on Hips".into(),
+    };
+    assert_eq!(features(&other, &FeatureConfig::default()), Err(expected));
+    let empty = turning_clip("drawn", 0, |_| (HIPS, 0.0));
+    assert_eq!(
+        features(&empty, &FeatureConfig::default()),
+        Err(FeatureError::NoFrames {
+            clip: "drawn".into()
+        })
+    );
+    for facing_sigma in [0.0, -1.0, f64::NAN, 1e12] {
+        let config = FeatureConfig {
+            facing_sigma,
+            ..FeatureConfig::default()
+        };
+        assert!(
+            features(&clip, &config)
+                .unwrap_err()
+                .to_string()
+                .starts_with("facing_sigma = "),
+            "{facing_sigma}"
+        );
+    }
+}
+
+#[test]
+fn the_binary_writes_the_same_numbers_as_float32() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (
+        folder.path().join("clip.bvh"),
+        folder.path().join("clip.npy"),
+    );
+    let clip = turning_clip("clip.bvh", 40, |frame| (HIPS, 0.02 * frame as f64));
+    bvh::write(
+        &input,
+        &Bvh::from_clip(&clip, channel_layout(&clip, [Axis::Z, Axis::X, Axis::Y])).unwrap(),
+    )
+    .unwrap();
+    cargo_bin_cmd!("keydance")
+        .arg("features")
+        .arg(&input)
+        .arg("--npy")
+        .arg(&output)
+        .assert()
+        .success();
+    let written: Array2<f32> = ndarray_npy::read_npy(&output).unwrap();
+    let expected = features(&clip, &FeatureConfig::default()).unwrap();
+    assert_eq!(written.dim(), (40, 154));
+    assert!(
+        written
+            .iter()
+            .zip(&expected)
+            .all(|(&found, &expected)| (f64::from(found) - expected).abs() < 1e-4)
+    );
+}

@@ -1,0 +1,170 @@
+//! Positions to rotations and back.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3};
+use keydance::data::{DataConfig, Dataset, Split};
+use keydance::motion::fit::{RotationFitError, fit_rotations};
+use keydance::motion::placement::world_positions;
+use keydance::motion::{
+    Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, JOINTS, Joint, Pose, Skeleton, features,
+};
+use proptest::prelude::*;
+
+fn skeleton() -> Skeleton {
+    let joints = DANCE_JOINTS
+        .iter()
+        .zip(DANCE_PARENTS)
+        .enumerate()
+        .map(|(index, (name, parent))| Joint {
+            name: name.to_string(),
+            parent,
+            offset: match *name {
+                "LeftUpLeg" | "LeftShoulder" => DVec3::new(9.0, 2.0, -2.0),
+                "RightUpLeg" | "RightShoulder" => DVec3::new(-9.0, 2.0, -2.0),
+                _ => DVec3::new(0.0, if index < 9 { -30.0 } else { 11.0 }, 0.0),
+            },
+            end_sites: Vec::new(),
+        })
+        .collect();
+    Skeleton { joints }
+}
+
+/// A dancer on the test skeleton that turns and bends every joint at its own speed.
+fn clip(frames: usize, speed: f64) -> Clip {
+    let skeleton = skeleton();
+    let pose = |time: usize| {
+        let mut translations: Vec<DVec3> =
+            skeleton.joints.iter().map(|joint| joint.offset).collect();
+        translations[0] = DVec3::new(time as f64, 90.0, 2.0 * time as f64);
+        let turn = |joint: usize| {
+            let axis = DVec3::new(1.0, joint as f64 % 3.0, 0.5).normalize();
+            DQuat::from_axis_angle(axis, speed * (1.0 + joint as f64 / 24.0) * time as f64)
+        };
+        Pose {
+            translations,
+            rotations: (0..JOINTS).map(turn).collect(),
+        }
+    };
+    Clip {
+        name: "bends".into(),
+        poses: (0..frames).map(pose).collect(),
+        skeleton,
+        frame_time: 1.0 / 30.0,
+    }
+}
+
+fn world(clip: &Clip) -> Vec<Vec<DVec3>> {
+    clip.poses
+        .iter()
+        .map(|pose| pose.world_positions(&clip.skeleton))
+        .collect()
+}
+
+proptest! {
+    #[test]
+    fn positions_of_a_pose_are_met_again(speed in 0.0..0.2f64) {
+        let clip = clip(12, speed);
+        let fit = fit_rotations(&clip.skeleton, &world(&clip), &clip.poses[0]).unwrap();
+        prop_assert!(fit.max_error < 1e-6, "{}", fit.max_error);
+        prop_assert!(fit.mean_error <= fit.max_error);
+    }
+
+    #[test]
+    fn bones_keep_their_length_whatever_the_positions(noise in prop::collection::vec(prop::array::uniform3(-20.0..20.0f64), JOINTS)) {
+        let clip = clip(2, 0.1);
+        let mut wanted = world(&clip);
+        for (joint, noise) in wanted[1].iter_mut().zip(&noise) {
+            *joint += DVec3::from(*noise);
+        }
+        let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap();
+        let found = fit.poses[1].world_positions(&clip.skeleton);
+        prop_assert!(found[0].distance(wanted[1][0]) < 1e-9);
+        for (index, joint) in clip.skeleton.joints.iter().enumerate() {
+            if let Some(parent) = joint.parent {
+                prop_assert!((found[index].distance(found[parent]) - joint.offset.length()).abs() < 1e-6);
+            }
+        }
+        let worst = found.iter().zip(&wanted[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        prop_assert!((fit.max_error - worst).abs() < 1e-9);
+    }
+
+    #[test]
+    fn world_positions_undo_the_features(speed in 0.0..0.3f64) {
+        let clip = clip(5, speed);
+        let features = features(&clip, &FeatureConfig::default()).unwrap();
+        for (frame, expected) in features.rows().into_iter().zip(world(&clip)) {
+            for (found, expected) in world_positions(frame).iter().zip(expected) {
+                prop_assert!(found.distance(expected) < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pose_that_already_fits_keeps_its_rotations() {
+    let clip = clip(8, 0.3);
+    let fit = fit_rotations(&clip.skeleton, &world(&clip)[7..], &clip.poses[7]).unwrap();
+    for (found, expected) in fit.poses[0].rotations.iter().zip(&clip.poses[7].rotations) {
+        assert!(found.angle_between(*expected) < 1e-6);
+    }
+}
+
+#[test]
+fn bones_that_are_too_long_are_reported_in_the_error() {
+    let clip = clip(1, 0.0);
+    let mut wanted = world(&clip);
+    // The head 5 cm farther along its bone: 5 cm off at one of 24 joints.
+    wanted[0][23].y += 5.0;
+    let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap();
+    assert!((fit.max_error - 5.0).abs() < 1e-9);
+    assert!((fit.mean_error - 5.0 / 24.0).abs() < 1e-9);
+}
+
+#[test]
+fn positions_that_do_not_fit_the_skeleton_are_errors() {
+    let clip = clip(3, 0.1);
+    let mut wanted = world(&clip);
+    wanted[2][5].z = f64::NAN;
+    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap_err();
+    assert!(
+        error.to_string().contains("frame 2, joint RightUpLeg"),
+        "{error}"
+    );
+    wanted[1].pop();
+    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap_err();
+    assert!(
+        error.to_string().contains("frame 1 has 23 joints"),
+        "{error}"
+    );
+    let none: [Vec<DVec3>; 0] = [];
+    let error = fit_rotations(&clip.skeleton, &none, &clip.poses[0]).unwrap_err();
+    assert_eq!(error, RotationFitError::NoFrames);
+}
+
+/// The folder with the dance clips: `KEYDANCE_DATA`, else `../shared/data/dance` beside the repository.
+fn dance_data() -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/dance");
+    let folder = std::env::var_os("KEYDANCE_DATA").map_or_else(beside, PathBuf::from);
+    folder.is_dir().then_some(folder)
+}
+
+#[test]
+fn recorded_dance_is_met_within_a_millimetre() {
+    let Some(folder) = dance_data() else {
+        println!("skipped: no dance clips; set KEYDANCE_DATA to their folder");
+        return;
+    };
+    let config = DataConfig {
+        split: Split::List {
+            train: vec!["Andria_Angry_v1-BVH.bvh".into()],
+            test: vec!["Anna_Active-BVH.bvh".into()],
+        },
+        ..DataConfig::default()
+    };
+    let data = Dataset::load(&folder, &config).unwrap();
+    let clip = &data.train[0].clip;
+    let fit = fit_rotations(&clip.skeleton, &world(clip), &clip.poses[0]).unwrap();
+    println!("mean {:.4} cm, max {:.4} cm", fit.mean_error, fit.max_error);
+    assert!(fit.max_error < 0.1, "{} cm", fit.max_error);
+}

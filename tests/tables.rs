@@ -1,0 +1,223 @@
+//! Tables 2 to 4: the paper's values, ours and the difference.
+
+use keydance::evaluation::{
+    Evaluation, LengthScores, TableRow, markdown_tables, paper, terminal_tables,
+};
+
+fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> TableRow {
+    let scores = |values: &[f64]| {
+        LengthScores::new(
+            lengths
+                .iter()
+                .copied()
+                .zip(values.iter().copied())
+                .collect(),
+        )
+    };
+    let shares = vec![share; lengths.len()];
+    TableRow {
+        name: name.into(),
+        evaluation: Evaluation {
+            lrp: scores(lrp),
+            avf: scores(&shares),
+            art: scores(&shares),
+            windows: lengths
+                .iter()
+                .map(|&length| (length, 1000 / length))
+                .collect(),
+        },
+        schedule_note: note.into(),
+    }
+}
+
+/// The table's lines that follow the line of this model, as cells.
+fn lines(table: &str, model: &str) -> Vec<Vec<String>> {
+    let mut lines = table
+        .lines()
+        .filter(|line| line.starts_with('|'))
+        .map(|line| {
+            let cells = line.trim_matches('|').split('|');
+            cells
+                .map(|cell| cell.trim().to_string())
+                .collect::<Vec<_>>()
+        })
+        .skip_while(|cells| cells[0] != model);
+    let first = lines
+        .next()
+        .unwrap_or_else(|| panic!("no line of {model} in {table}"));
+    [first]
+        .into_iter()
+        .chain(lines.take_while(|cells| cells[0].is_empty()))
+        .collect()
+}
+
+fn tables(rows: &[TableRow]) -> [String; 3] {
+    let text = markdown_tables(rows, "3 clips");
+    let parts: Vec<&str> = text.split("## Table ").skip(1).collect();
+    assert_eq!(parts.len(), 3);
+    [parts[0].into(), parts[1].into(), parts[2].into()]
+}
+
+#[test]
+fn the_papers_averages_are_the_means_of_its_lengths() {
+    for row in paper::ROWS {
+        let tables = [Some(row.lrp), row.avf, row.art];
+        for values in tables.into_iter().flatten() {
+            let mean = values[..4].iter().sum::<f64>() / 4.0;
+            assert!(
+                (mean - values[4]).abs() < 0.0101,
+                "{}: {values:?}",
+                row.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_model_of_the_paper_has_its_value_ours_and_the_difference() {
+    let ours = row(
+        "whole_model",
+        &paper::LENGTHS,
+        &[30.07, 50.06, 60.0, 80.0],
+        0.8,
+        "0.002 of the schedule",
+    );
+    let [lrp, avf, art] = tables(&[ours]);
+    let found = lines(&lrp, "Whole model");
+    assert_eq!(
+        found[0],
+        [
+            "Whole model",
+            "paper",
+            "27.07",
+            "50.06",
+            "63.01",
+            "74.37",
+            "53.63"
+        ]
+    );
+    assert_eq!(
+        found[1],
+        ["", "ours", "30.07", "50.06", "60.00", "80.00", "55.03"]
+    );
+    assert_eq!(
+        found[2],
+        [
+            "",
+            "difference",
+            "+3.00",
+            "+0.00",
+            "-3.01",
+            "+5.63",
+            "+1.40"
+        ]
+    );
+    assert_eq!(
+        lines(&avf, "Whole model")[2][2..],
+        ["+0.08", "+0.04", "+0.05", "+0.08", "+0.06"]
+    );
+    assert_eq!(
+        lines(&art, "Whole model")[0][2..],
+        ["0.86", "0.85", "0.80", "0.72", "0.81"]
+    );
+    for table in [&lrp, &avf, &art] {
+        assert!(
+            table.contains("- Whole model: 0.002 of the schedule"),
+            "{table}"
+        );
+        assert!(table.contains("Ours on 3 clips"));
+        assert_eq!(
+            lines(table, "Condition-FC").len(),
+            1,
+            "ours where there are none"
+        );
+    }
+}
+
+#[test]
+fn interpolation_has_no_paper_value_for_avf_and_art() {
+    let [lrp, avf, _] = tables(&[row(
+        "interpolation",
+        &paper::LENGTHS,
+        &[1.0; 4],
+        0.5,
+        "not trained",
+    )]);
+    assert_eq!(lines(&lrp, "Interpolation").len(), 3);
+    assert_eq!(
+        lines(&avf, "Interpolation"),
+        [[
+            "Interpolation",
+            "ours",
+            "0.50",
+            "0.50",
+            "0.50",
+            "0.50",
+            "0.50"
+        ]]
+    );
+    assert!(!avf.contains("Harvey"));
+}
+
+#[test]
+fn an_average_over_other_lengths_is_not_compared() {
+    let [lrp, ..] = tables(&[row("whole_model", &[10, 30], &[27.0, 40.0], 0.5, "demo")]);
+    let found = lines(&lrp, "Whole model");
+    assert_eq!(found[0][2..], ["27.07", "-", "53.63"]);
+    assert_eq!(found[1][2..], ["27.00", "40.00", "33.50"]);
+    assert_eq!(found[2][2..], ["-0.07", "-", "-"]);
+}
+
+#[test]
+fn runs_of_one_model_and_models_of_our_own_are_all_there() {
+    let rows = [
+        row("whole_model", &paper::LENGTHS, &[1.0; 4], 0.5, "short"),
+        row("whole_model", &paper::LENGTHS, &[2.0; 4], 0.5, "long"),
+        row("preferred", &paper::LENGTHS, &[3.0; 4], 0.5, "long"),
+    ];
+    let [lrp, ..] = tables(&rows);
+    let kinds: Vec<String> = lines(&lrp, "Whole model")
+        .into_iter()
+        .map(|cells| cells[1].clone())
+        .collect();
+    assert_eq!(
+        kinds,
+        ["paper", "ours (1)", "difference", "ours (2)", "difference"]
+    );
+    assert_eq!(lines(&lrp, "preferred")[0][1..3], ["ours", "3.00"]);
+}
+
+#[test]
+fn the_terminal_shows_all_three_scores_and_the_windows() {
+    let rows = [row(
+        "interpolation",
+        &paper::LENGTHS,
+        &[22.85, 95.81, 116.83, 123.99],
+        0.25,
+        "",
+    )];
+    let text = terminal_tables(&rows);
+    let cells = |start: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.starts_with(start)).unwrap();
+        line[start.len()..]
+            .split_whitespace()
+            .map(str::to_string)
+            .collect()
+    };
+    assert_eq!(
+        cells("interpolation"),
+        ["22.85", "95.81", "116.83", "123.99", "89.87"]
+    );
+    assert_eq!(
+        cells("  paper"),
+        ["13.83", "87.59", "113.59", "124.47", "84.87"]
+    );
+    assert_eq!(cells("windows, interpolation"), ["100", "20", "10", "6"]);
+    for score in [
+        "LRP (cm)",
+        "AVF (share of windows)",
+        "ART (share of windows)",
+    ] {
+        assert_eq!(cells(score), ["10", "50", "100", "150", "AVG"]);
+    }
+}
