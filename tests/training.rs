@@ -364,3 +364,72 @@ fn clips_shorter_than_every_window_are_an_error_that_says_what_to_do() {
         "{text}"
     );
 }
+
+#[test]
+fn the_papers_configs_load_and_differ_from_the_whole_model_by_their_name_and_one_field() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/paper");
+    let load = |name: &str| ExperimentConfig::load(&folder.join(name), &[]).unwrap();
+    let whole = load("whole_model.toml");
+    assert_eq!(whole, ExperimentConfig::default());
+    for (name, field) in [
+        ("one_lstm", "model.lstms: 2, 1"),
+        (
+            "condition_fc",
+            "model.controllers: \"transformer\", \"fully_connected\"",
+        ),
+        ("one_decoder", "model.decoders: 2, 1"),
+        (
+            "without_velocity_factor",
+            "model.velocity_factor: true, false",
+        ),
+        ("without_key_loss", "model.loss.key: 0.2, 0.0"),
+    ] {
+        let ablation = load(&format!("{name}.toml"));
+        let named = format!("name: \"whole_model\", \"{name}\"");
+        assert_eq!(
+            whole.differences(&ablation).unwrap(),
+            [field.to_string(), named]
+        );
+    }
+    let data = dataset();
+    let interpolation = load("interpolation.toml");
+    assert_eq!(interpolation.name, "interpolation");
+    let error = Trainer::new(interpolation, &data, 1)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(error.contains("no training"), "{error}");
+}
+
+#[test]
+fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
+    let data = dataset();
+    let sets = [
+        "hidden=8",
+        "code=4",
+        "heads=2",
+        "feed_forward=4",
+        "encoder_layers=1",
+        "decoder_layers=1",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("small.toml");
+    fs::write(
+        &file,
+        "schedule = { min_len = 3, max_len = 4, fraction = 0.1, batch_size = 8 }",
+    )
+    .unwrap();
+    let sets: Vec<String> = sets.iter().map(|set| format!("model.{set}")).collect();
+    let config = ExperimentConfig::load(&file, &sets).unwrap();
+    let mut trainer = Trainer::new(config.clone(), &data, 2).unwrap();
+    let run = RunFolder::create(&folder.path().join("run"), &config).unwrap();
+    assert!(run.model().err().unwrap().to_string().contains("--resume"));
+    train(&mut trainer, Some(&run), None);
+    let loaded = run.model().unwrap();
+    let digest = keydance::models::weights::digest(loaded.parameters());
+    assert_eq!(digest, trainer.weights_digest());
+    assert_eq!(
+        keydance::models::weights::digest(trainer.into_model().parameters()),
+        digest
+    );
+}

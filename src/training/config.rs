@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::data::DataConfig;
-use crate::models::registry::ModelConfig;
+use crate::models::ModelConfig;
 use crate::optim::AdamConfig;
 
 /// Longest transition that a schedule may name, frames.

@@ -41,7 +41,7 @@ pub enum TrainingError {
         step: u64,
         windows: usize,
         length: usize,
-        cause: AutogradError,
+        cause: Box<AutogradError>,
     },
     /// The training diverged. The weights are those before the step.
     #[error(
@@ -92,6 +92,10 @@ pub enum TrainingError {
         path: PathBuf,
         problems: Vec<String>,
     },
+    #[error(
+        "{path} is not there: the training is not finished; finish it with keydance train --resume"
+    )]
+    NotFinished { path: PathBuf },
     #[error("{path} is not a manifest: {cause}")]
     Manifest {
         path: PathBuf,

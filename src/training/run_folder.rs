@@ -19,6 +19,11 @@ use super::config::ExperimentConfig;
 use super::durable::{self, FileError};
 use super::error::TrainingError;
 use super::manifest::Manifest;
+use super::streams::Streams;
+use crate::autograd::Parameters;
+use crate::models::TrainedModel;
+use crate::models::weights::SavedWeights;
+use crate::nn::Initialiser;
 
 const CONFIG: &str = "config.toml";
 const MANIFEST: &str = "manifest.json";
@@ -95,6 +100,30 @@ impl RunFolder {
     /// It cannot be read, or this version does not know one of its keys.
     pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
         Ok(ExperimentConfig::load(&self.path.join(CONFIG), &[])?)
+    }
+
+    /// The trained model.
+    ///
+    /// # Errors
+    /// The training is not finished; the weights are damaged, or not those of the model that their config describes.
+    pub fn model(&self) -> Result<TrainedModel, TrainingError> {
+        let path = self.weights();
+        if !path.exists() {
+            return Err(TrainingError::NotFinished { path });
+        }
+        let saved = SavedWeights::read(&path)?;
+        let config = ExperimentConfig::parse(&saved.config, &path.display().to_string())?;
+        let mut parameters = Parameters::new();
+        let rng = Streams::new(config.seed).initialisation();
+        let mut init = Initialiser::new(&mut parameters, rng);
+        let network = config.model.build(&mut init, &saved.standardisation)?;
+        saved.load_into(&mut parameters)?;
+        Ok(TrainedModel::new(
+            config.name,
+            network,
+            parameters,
+            saved.standardisation,
+        ))
     }
 
     /// The manifest; none before the training has begun.

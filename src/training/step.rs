@@ -281,7 +281,7 @@ fn failure(input: &StepInput<'_>, cause: AutogradError) -> TrainingError {
             step: input.step + 1,
             windows: input.plan.windows.len(),
             length: input.plan.length,
-            cause,
+            cause: Box::new(cause),
         },
     }
 }

@@ -18,7 +18,7 @@ use super::step::{StepInput, StepReport, Stepper, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{DanceClip, Dataset, Standardisation};
-use crate::models::{Feed, ModelError, Network, weights};
+use crate::models::{Feed, ModelError, Network, TrainedModel, weights};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
 
@@ -174,6 +174,16 @@ impl<'d> Trainer<'d> {
             statistics,
             &self.config_toml,
         )?)
+    }
+
+    /// The model with the weights as they are.
+    pub fn into_model(self) -> TrainedModel {
+        TrainedModel::new(
+            self.config.name,
+            self.network,
+            self.parameters,
+            self.windows.standardisation,
+        )
     }
 
     /// Takes up the newest whole checkpoint of a run; the damaged ones after it are set aside. Without any checkpoint the training
