@@ -2,8 +2,16 @@
 
 mod bvh;
 mod features;
+mod train;
+
+use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::training::TrainingError;
+
+/// Exit code of a training that ended because a loss or gradient was not finite.
+const DIVERGED: u8 = 3;
 
 /// Dance synthesis from keyframes.
 #[derive(Debug, Parser)]
@@ -19,17 +27,29 @@ enum Command {
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
+    /// Train a model
+    Train(train::TrainArgs),
 }
 
 impl Cli {
-    /// Runs the subcommand.
+    /// Runs the subcommand. Returns the exit code.
     ///
     /// # Errors
     /// Whatever the subcommand could not do.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
-            Command::Bvh(args) => bvh::run(args),
-            Command::Features(args) => features::run(args),
+            Command::Bvh(args) => bvh::run(args)?,
+            Command::Features(args) => features::run(args)?,
+            Command::Train(args) => return train::run(args),
         }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The exit code of an error.
+pub fn exit_code(error: &anyhow::Error) -> ExitCode {
+    match error.downcast_ref() {
+        Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
+        _ => ExitCode::FAILURE,
     }
 }
