@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand.
 
+mod bench_generate;
+mod bench_step;
 mod bvh;
 mod evaluate;
 mod evaluation_record;
@@ -29,6 +31,10 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Time the generation of frames
+    BenchGenerate(bench_generate::BenchGenerateArgs),
+    /// Time a training step
+    BenchStep(bench_step::BenchStepArgs),
     /// Look into BVH files
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
@@ -48,6 +54,8 @@ impl Cli {
     /// Whatever the subcommand could not do.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
+            Command::BenchGenerate(args) => bench_generate::run(args)?,
+            Command::BenchStep(args) => bench_step::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
             Command::Train(args) => return train::run(args),

@@ -10,6 +10,7 @@ mod config_file;
 mod durable;
 mod error;
 pub mod manifest;
+pub mod measure;
 mod run_folder;
 mod schedule;
 pub mod state;
