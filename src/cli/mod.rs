@@ -3,8 +3,14 @@
 mod bench_generate;
 mod bench_step;
 mod bvh;
+mod evaluate;
+mod evaluation_record;
 mod features;
+mod progress;
+mod tables;
+mod threads;
 mod train;
+mod watched;
 
 use std::process::ExitCode;
 
@@ -35,6 +41,10 @@ enum Command {
     Features(features::FeaturesArgs),
     /// Train a model
     Train(train::TrainArgs),
+    /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
+    Evaluate(evaluate::EvaluateArgs),
+    /// Set scores beside the paper's in its tables 2 to 4
+    Tables(tables::TablesArgs),
 }
 
 impl Cli {
@@ -49,6 +59,8 @@ impl Cli {
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
             Command::Train(args) => return train::run(args),
+            Command::Evaluate(args) => evaluate::run(args)?,
+            Command::Tables(args) => tables::run(args)?,
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -1,24 +1,22 @@
 //! `keydance train`: reads a config and a data folder, writes a run's folder.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use clap::Args;
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
+use super::progress::Progress;
+use super::threads::Threads;
 use crate::data::Dataset;
-use crate::training::{ExperimentConfig, Outcome, RunFolder, Schedule, StepReport, Trainer};
+use crate::training::{ExperimentConfig, Outcome, RunFolder, Trainer};
 
 /// Exit code after Ctrl-C or SIGTERM, as shells have it.
 const INTERRUPTED: u8 = 130;
-/// Time between two lines where there is no terminal for a progress bar.
-const LINE_EVERY: Duration = Duration::from_secs(10);
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -36,9 +34,8 @@ pub struct TrainArgs {
     /// Go on from the newest checkpoint in RUN_DIR; the end is the same to the bit as without the break
     #[arg(long)]
     resume: bool,
-    /// Threads to compute on [default: all cores]; the weights do not depend on it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// # Errors
@@ -48,10 +45,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout();
     writeln!(out, "{}", config.to_toml()?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
-    let threads = match args.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let threads = args.threads.count();
     let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
     describe(&trainer, threads)?;
     let run = if args.resume {
@@ -137,7 +131,7 @@ fn resume_command(args: &TrainArgs) -> String {
     for set in &args.set {
         command += &format!(" --set {}", quote(set));
     }
-    if let Some(threads) = args.threads {
+    if let Some(threads) = args.threads.given() {
         command += &format!(" --threads {threads}");
     }
     command + " --resume"
@@ -153,74 +147,6 @@ fn quote(word: &str) -> String {
     }
 }
 
-/// A bar on a terminal, a line now and then elsewhere.
-struct Progress {
-    bar: Option<ProgressBar>,
-    steps: u64,
-    frame_steps: u64,
-    begun: Instant,
-    /// Frames predicted before this process.
-    before: u64,
-    line: Option<Instant>,
-}
-
-impl Progress {
-    fn new(schedule: &Schedule, before: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template(
-                "{wide_bar} {percent:>3} %  {msg}  {per_sec}  {eta} left",
-            )
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let frames_per_second =
-                |state: &indicatif::ProgressState, w: &mut dyn std::fmt::Write| {
-                    // A terminal that takes no text shows none.
-                    let _ = write!(w, "{:.0} frames/s", state.per_sec());
-                };
-            let bar = ProgressBar::new(schedule.frame_steps())
-                .with_style(style.with_key("per_sec", frames_per_second));
-            bar.set_position(before);
-            bar.reset_eta();
-            bar
-        });
-        Self {
-            bar,
-            steps: schedule.steps(),
-            frame_steps: schedule.frame_steps(),
-            begun: Instant::now(),
-            before,
-            line: None,
-        }
-    }
-
-    fn step(&mut self, report: &StepReport) {
-        let what = format!(
-            "step {}/{}  N {}  loss {:.4}",
-            report.step, self.steps, report.length, report.total
-        );
-        if let Some(bar) = &self.bar {
-            bar.set_message(what);
-            bar.set_position(report.frame_steps);
-            return;
-        }
-        if self.line.is_none_or(|last| last.elapsed() >= LINE_EVERY) || report.step == self.steps {
-            self.line = Some(Instant::now());
-            let done = (report.frame_steps - self.before) as f64;
-            let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
-            let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
-            eprintln!(
-                "{what}  {rate:.0} frames/s  {} left",
-                HumanDuration(Duration::from_secs(left as u64))
-            );
-        }
-    }
-
-    fn end(&self) {
-        if let Some(bar) = &self.bar {
-            bar.abandon();
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,7 +159,7 @@ mod tests {
             out: "runs/1".into(),
             set: vec!["name=x".into(), "data.split={ share = 0.5 }".into()],
             resume: false,
-            threads: Some(2),
+            threads: Threads::of(2),
         };
         assert_eq!(
             resume_command(&args),

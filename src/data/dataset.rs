@@ -1,5 +1,6 @@
 //! A folder of BVH files as training, validation and test clips.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ pub struct Dataset {
     pub validation: Vec<DanceClip>,
     pub test: Vec<DanceClip>,
     /// SHA-256 over the files' names and bytes, hexadecimal: what
-    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder.
+    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over names and poses.
     pub digest: String,
 }
 
@@ -56,13 +57,16 @@ pub enum DataError {
         #[source]
         source: std::io::Error,
     },
-    /// The config and the folder contradict each other.
-    #[error("the config says {config}, but the data folder {folder} {found}")]
+    /// The config and the clips contradict each other.
+    #[error("the config says {config}, but {origin} {found}")]
     Split {
         config: String,
-        folder: PathBuf,
+        /// The data folder, or what else the clips come from.
+        origin: String,
         found: String,
     },
+    #[error("two clips are called {name}; clips are split by their names, so give each its own")]
+    SameName { name: String },
     #[error("data.{key} = {value}: expected {expected}")]
     Config {
         key: &'static str,
@@ -114,12 +118,44 @@ impl Dataset {
     /// The folder has no BVH file, a file is bad, or the config does not fit what is there.
     pub fn load(folder: &Path, config: &DataConfig) -> Result<Self, DataError> {
         let names = clip_names(folder)?;
-        let parts = split(&names, folder, config)?;
+        let origin = format!("the data folder {}", folder.display());
+        Self::assemble(&names, &origin, config, |name, mapping| {
+            read_clip(folder, name, mapping, config)
+        })
+    }
+
+    /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as files.
+    ///
+    /// # Errors
+    /// Two clips of one name, a clip that cannot be measured, or a config that does not fit the clips.
+    pub fn from_clips(clips: Vec<Clip>, config: &DataConfig) -> Result<Self, DataError> {
+        let mut by_name = BTreeMap::new();
+        for clip in clips {
+            if let Some(clip) = by_name.insert(clip.name.clone(), clip) {
+                return Err(DataError::SameName { name: clip.name });
+            }
+        }
+        let names: Vec<String> = by_name.keys().cloned().collect();
+        Self::assemble(&names, "the set of clips", config, |name, mapping| {
+            let clip = &by_name[name];
+            let measured = DanceClip::new(clip.clone(), mapping, config)?;
+            Ok((measured, pose_digest(clip)))
+        })
+    }
+
+    /// The parts of the split, each clip with the digest of what it was made from as `read` gives them.
+    fn assemble(
+        names: &[String],
+        origin: &str,
+        config: &DataConfig,
+        read: impl Fn(&String, Option<&Mapping>) -> Result<(DanceClip, String), DataError> + Sync,
+    ) -> Result<Self, DataError> {
+        let parts = split(names, origin, config)?;
         let mapping = config.mapping.as_deref().map(Mapping::read).transpose()?;
         let read = |names: &Vec<String>| -> Result<Vec<(DanceClip, String)>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
-                .map(|name| read_clip(folder, name, mapping.as_ref(), config))
+                .map(|name| read(name, mapping.as_ref()))
                 .collect();
             clips.into_iter().collect()
         };
@@ -138,7 +174,7 @@ impl Dataset {
             test: clips(test),
             digest,
         };
-        check_dance_frames(&dataset, folder, config)?;
+        check_dance_frames(&dataset, origin, config)?;
         Ok(dataset)
     }
 }
@@ -191,6 +227,20 @@ fn read_clip(
         DanceClip::new(clip, mapping, config)?,
         hexadecimal(&Sha256::digest(&bytes)),
     ))
+}
+
+/// SHA-256 over rate and poses, hexadecimal.
+fn pose_digest(clip: &Clip) -> String {
+    let mut hash = Sha256::new();
+    hash.update(clip.frame_time.to_le_bytes());
+    for pose in &clip.poses {
+        let numbers = pose.translations.iter().flat_map(|x| x.to_array());
+        let numbers = numbers.chain(pose.rotations.iter().flat_map(|x| x.to_array()));
+        for number in numbers {
+            hash.update(number.to_le_bytes());
+        }
+    }
+    hexadecimal(&hash.finalize())
 }
 
 fn digest<'a>(clips: impl Iterator<Item = &'a (DanceClip, String)>) -> String {

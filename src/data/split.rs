@@ -1,7 +1,6 @@
 //! Which clips train, validate and test.
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use super::config::{DataConfig, Split};
 use super::dataset::{DanceClip, DataError, Dataset};
@@ -18,15 +17,15 @@ pub(super) struct Parts {
     pub test: Vec<String>,
 }
 
-/// Splits the files of a folder, given by name and sorted bytewise.
+/// Splits clips, given by name and sorted bytewise; `origin` is what errors call where they come from.
 pub(super) fn split(
     names: &[String],
-    folder: &Path,
+    origin: &str,
     config: &DataConfig,
 ) -> Result<Parts, DataError> {
     let misfit = |config: String, found: String| DataError::Split {
         config,
-        folder: folder.into(),
+        origin: origin.into(),
         found,
     };
     if !(0.0..1.0).contains(&config.validation_share) {
@@ -126,7 +125,7 @@ fn floor(number: f64) -> usize {
 /// Checks the frame counts of the paper's split.
 pub(super) fn check_dance_frames(
     dataset: &Dataset,
-    folder: &Path,
+    origin: &str,
     config: &DataConfig,
 ) -> Result<(), DataError> {
     let frames = |clips: &[DanceClip]| clips.iter().map(DanceClip::frames).sum::<usize>();
@@ -141,7 +140,7 @@ pub(super) fn check_dance_frames(
                 "split = \"dance\" at {} fps, which has {} training and {} test frames",
                 config.fps, expected.0, expected.1
             ),
-            folder: folder.into(),
+            origin: origin.into(),
             found: format!(
                 "gives {} and {}; for other data set data.split = {{ share = 0.8 }}",
                 found.0, found.1
@@ -167,7 +166,7 @@ mod tests {
             split: Split::Share(0.25),
             ..DataConfig::default()
         };
-        let parts = split(&names(12), Path::new("x"), &config).unwrap();
+        let parts = split(&names(12), "x", &config).unwrap();
         assert_eq!(parts.train, ["j.bvh", "k.bvh", "l.bvh"]);
         assert_eq!(parts.test[..2], ["a.bvh", "b.bvh"]);
     }
@@ -178,10 +177,10 @@ mod tests {
             split: Split::Share(0.5),
             ..DataConfig::default()
         };
-        let without = split(&names(20), Path::new("x"), &plain).unwrap();
+        let without = split(&names(20), "x", &plain).unwrap();
         let with = split(
             &names(20),
-            Path::new("x"),
+            "x",
             &DataConfig {
                 validation_share: 0.3,
                 ..plain
@@ -204,13 +203,13 @@ mod tests {
                 split: split_by,
                 ..DataConfig::default()
             };
-            split(&names(count), Path::new("folder"), &config)
+            split(&names(count), "the data folder", &config)
                 .unwrap_err()
                 .to_string()
         };
         let text = message(Split::Dance, 4);
         assert!(
-            text.contains("123 clips") && text.contains("folder holds 4"),
+            text.contains("123 clips") && text.contains("the data folder holds 4"),
             "{text}"
         );
         let list = |train: &str, test: &str| Split::List {

@@ -38,7 +38,7 @@ pub(super) fn write_synced(path: &Path, content: &[u8]) -> Result<(), FileError>
 }
 
 /// Replaces a file by a whole new one: written beside it, then renamed.
-pub(super) fn replace(path: &Path, content: &[u8]) -> Result<(), FileError> {
+pub(crate) fn replace(path: &Path, content: &[u8]) -> Result<(), FileError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!(".{name}.partial"));
     write_synced(&partial, content)?;

@@ -87,6 +87,18 @@ pub enum TrainingError {
         saved: String,
         found: String,
     },
+    #[error(
+        "{path} holds no weights, neither of a finished training nor of a checkpoint; train it with `keydance train`"
+    )]
+    NoWeights { path: PathBuf },
+    #[error(
+        "{path} holds the weights of another model than the config describes ({}); values there, values of the config",
+        differences.join("; ")
+    )]
+    OtherModel {
+        path: PathBuf,
+        differences: Vec<String>,
+    },
     #[error("no checkpoint of {path} can be used: {}", problems.join("; "))]
     NoCheckpoint {
         path: PathBuf,

@@ -16,6 +16,7 @@ mod schedule;
 pub mod state;
 mod step;
 mod streams;
+mod trained_model;
 mod trainer;
 
 pub use config::{
@@ -24,6 +25,7 @@ pub use config::{
 };
 pub use config_file::ConfigError;
 pub use durable::FileError;
+pub(crate) use durable::replace as replace_file;
 pub use error::TrainingError;
 pub use manifest::{Manifest, RunState};
 pub use run_folder::RunFolder;

@@ -94,12 +94,17 @@ impl RunFolder {
         self.path.join(WEIGHTS_FILE)
     }
 
+    /// The file of the resolved config.
+    pub fn config_path(&self) -> PathBuf {
+        self.path.join(CONFIG)
+    }
+
     /// The resolved config.
     ///
     /// # Errors
     /// It cannot be read, or this version does not know one of its keys.
     pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
-        Ok(ExperimentConfig::load(&self.path.join(CONFIG), &[])?)
+        Ok(ExperimentConfig::load(&self.config_path(), &[])?)
     }
 
     /// The trained model.

@@ -1,0 +1,190 @@
+//! `keydance evaluate`: reads a run's folder (or the config of a model that needs no training) and a data folder, writes scores.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::evaluation_record::{EvaluatedData, EvaluationRecord, write_json};
+use super::threads::Threads;
+use super::watched::evaluate_watched;
+use crate::data::Dataset;
+use crate::evaluation::{Protocol, TableRow, terminal_tables};
+use crate::models::TransitionModel;
+use crate::training::{ExperimentConfig, RunFolder, replace_file};
+
+#[derive(Debug, Args)]
+pub struct EvaluateArgs {
+    /// Folder of a run, or the config of a model that needs no training
+    #[arg(value_name = "RUN_DIR_OR_CONFIG")]
+    run: PathBuf,
+    /// Folder of BVH files; the config says which of them test
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Write the scores here, too; a run's folder gets them anyway, as evaluation.json
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Override a key of the config, such as data.split.share=0.8; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Evaluate on other data than the run was trained on
+    #[arg(long)]
+    other_data: bool,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// # Errors
+/// The run, its weights or the data cannot be used, or do not fit each other; nothing is written then. A file cannot be written.
+pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
+    let subject = Subject::open(&args)?;
+    let dataset = Dataset::load(&args.data, &subject.config.data)?;
+    if !args.other_data {
+        subject.check_data(&dataset, &args.data)?;
+    }
+    let mut out = std::io::stdout();
+    let data = EvaluatedData::of(&dataset);
+    writeln!(
+        out,
+        "{} on {} test clips, {} frames\n",
+        subject.what, data.test_clips, data.test_frames
+    )?;
+    let outcome = args.threads.pool()?.install(|| {
+        evaluate_watched(&Protocol::default(), subject.model.as_ref(), &dataset.test)
+    })?;
+    for skipped in &outcome.skipped {
+        eprintln!("warning: {skipped}");
+    }
+    let row = TableRow {
+        name: subject.config.name.clone(),
+        evaluation: outcome.evaluation.clone(),
+        schedule_note: String::new(),
+    };
+    write!(out, "{}", terminal_tables(&[row]))?;
+    if let Some(path) = &args.json {
+        write_json(path, &outcome.evaluation)?;
+    }
+    if let Some(folder) = subject.folder(args.out.as_deref())? {
+        let evaluation = outcome.evaluation;
+        EvaluationRecord { evaluation, data }.write(folder)?;
+    }
+    Ok(())
+}
+
+/// What is evaluated.
+struct Subject {
+    config: ExperimentConfig,
+    model: Box<dyn TransitionModel>,
+    /// What to call it in the output.
+    what: String,
+    /// The run's folder; none for a config.
+    run: Option<RunFolder>,
+}
+
+impl Subject {
+    fn open(args: &EvaluateArgs) -> anyhow::Result<Self> {
+        let path = &args.run;
+        if !path.is_dir() {
+            let config = ExperimentConfig::load(path, &args.set)?;
+            let threshold = config.data.contact_threshold;
+            let model = config.model.untrained(threshold).with_context(|| {
+                format!(
+                    "{} describes a model that is trained; train it with `keydance train {} --data {} --out RUN_DIR` and \
+                     evaluate RUN_DIR",
+                    path.display(),
+                    path.display(),
+                    args.data.display()
+                )
+            })?;
+            return Ok(Self {
+                what: format!("{} of {}", config.name, path.display()),
+                config,
+                model,
+                run: None,
+            });
+        }
+        if args.out.is_some() {
+            anyhow::bail!(
+                "--out is for a config; {} is a run's folder and keeps its scores itself",
+                path.display()
+            );
+        }
+        let run = RunFolder::open(path);
+        if !run.config_path().exists() {
+            anyhow::bail!(
+                "{} is not a run's folder: it has no {}; `keydance train` makes one",
+                path.display(),
+                file_name(&run.config_path())
+            );
+        }
+        let config = ExperimentConfig::load(&run.config_path(), &args.set)?;
+        let untrained = config.model.untrained(config.data.contact_threshold);
+        let (model, what) = match untrained {
+            Some(model) => (model, format!("{} of {}", config.name, path.display())),
+            None => {
+                let model: Box<dyn TransitionModel> = Box::new(run.trained_model(&config)?);
+                let weights = run.newest_weights()?;
+                (model, format!("{}, {}", config.name, weights.display()))
+            }
+        };
+        Ok(Self {
+            config,
+            model,
+            what,
+            run: Some(run),
+        })
+    }
+
+    /// Refuses data that the run was not trained on: its training clips may be test clips there.
+    fn check_data(&self, dataset: &Dataset, folder: &Path) -> anyhow::Result<()> {
+        let manifest = self.run.as_ref().map(RunFolder::manifest).transpose()?;
+        if let Some(manifest) = manifest.flatten()
+            && manifest.data_digest != dataset.digest
+        {
+            anyhow::bail!(
+                "{} was trained on data with digest {}, {} has digest {}; give --other-data to evaluate it there all the same",
+                manifest.name,
+                manifest.data_digest,
+                folder.display(),
+                dataset.digest
+            );
+        }
+        Ok(())
+    }
+
+    /// The folder that keeps the scores, made where a config asks for one.
+    fn folder<'a>(&'a self, out: Option<&'a Path>) -> anyhow::Result<Option<&'a Path>> {
+        if let Some(run) = &self.run {
+            return Ok(Some(run.path()));
+        }
+        let Some(folder) = out else {
+            return Ok(None);
+        };
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{} cannot be created", folder.display()))?;
+        let run = RunFolder::open(folder);
+        if run.config_path().exists() {
+            let differences = run.config()?.differences(&self.config)?;
+            if !differences.is_empty() {
+                anyhow::bail!(
+                    "{} holds scores of another config ({}); values there, values now; give another --out",
+                    folder.display(),
+                    differences.join("; ")
+                );
+            }
+        }
+        replace_file(&run.config_path(), self.config.to_toml()?.as_bytes())?;
+        Ok(Some(folder))
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}

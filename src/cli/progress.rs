@@ -1,0 +1,82 @@
+//! How far a training has come, on stderr.
+
+use std::io::IsTerminal as _;
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+
+use crate::training::{Schedule, StepReport};
+
+/// Time between two lines where there is no terminal for a progress bar.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// A bar on a terminal, a line now and then elsewhere.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    steps: u64,
+    frame_steps: u64,
+    begun: Instant,
+    /// Frames predicted before this process.
+    before: u64,
+    line: Option<Instant>,
+}
+
+impl Progress {
+    /// `before`: frames that earlier processes predicted of the schedule's.
+    pub fn new(schedule: &Schedule, before: u64) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template(
+                "{wide_bar} {percent:>3} %  {msg}  {per_sec}  {eta} left",
+            )
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+            let frames_per_second =
+                |state: &indicatif::ProgressState, w: &mut dyn std::fmt::Write| {
+                    // A terminal that takes no text shows none.
+                    let _ = write!(w, "{:.0} frames/s", state.per_sec());
+                };
+            let bar = ProgressBar::new(schedule.frame_steps())
+                .with_style(style.with_key("per_sec", frames_per_second));
+            bar.set_position(before);
+            bar.reset_eta();
+            bar
+        });
+        Self {
+            bar,
+            steps: schedule.steps(),
+            frame_steps: schedule.frame_steps(),
+            begun: Instant::now(),
+            before,
+            line: None,
+        }
+    }
+
+    /// Shows a step that is done.
+    pub fn step(&mut self, report: &StepReport) {
+        let what = format!(
+            "step {}/{}  N {}  loss {:.4}",
+            report.step, self.steps, report.length, report.total
+        );
+        if let Some(bar) = &self.bar {
+            bar.set_message(what);
+            bar.set_position(report.frame_steps);
+            return;
+        }
+        if self.line.is_none_or(|last| last.elapsed() >= LINE_EVERY) || report.step == self.steps {
+            self.line = Some(Instant::now());
+            let done = (report.frame_steps - self.before) as f64;
+            let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
+            let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
+            eprintln!(
+                "{what}  {rate:.0} frames/s  {} left",
+                HumanDuration(Duration::from_secs(left as u64))
+            );
+        }
+    }
+
+    /// Leaves the bar as it is.
+    pub fn end(&self) {
+        if let Some(bar) = &self.bar {
+            bar.abandon();
+        }
+    }
+}

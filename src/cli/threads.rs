@@ -1,0 +1,46 @@
+//! `--threads`: how many threads a command computes on.
+
+use anyhow::Context as _;
+use clap::Args;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Threads {
+    /// Threads to compute on [default: all cores]; no number in the result depends on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl Threads {
+    #[cfg(test)]
+    pub fn of(threads: u16) -> Self {
+        Self {
+            threads: Some(threads),
+        }
+    }
+
+    /// The number asked for, if any.
+    pub fn given(self) -> Option<u16> {
+        self.threads
+    }
+
+    /// The number asked for, or that of all cores.
+    pub fn count(self) -> usize {
+        match self.threads {
+            Some(threads) => threads.into(),
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+
+    /// Threads for rayon.
+    ///
+    /// # Errors
+    /// The system gives no more threads.
+    pub fn pool(self) -> anyhow::Result<ThreadPool> {
+        let count = self.count();
+        ThreadPoolBuilder::new()
+            .num_threads(count)
+            .build()
+            .with_context(|| format!("no pool of {count} threads"))
+    }
+}
