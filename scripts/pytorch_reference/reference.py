@@ -4,6 +4,7 @@ B windows of N + 1 frames, time first: window [N + 1, B, 154], standardised; fra
 """
 
 import math
+from dataclasses import dataclass
 
 import torch
 from torch import nn
@@ -23,25 +24,39 @@ from layout import (
 )
 
 
-def encoder(inputs):
-    return nn.Sequential(nn.Linear(inputs, 512), nn.PReLU(), nn.Linear(512, WIDTH), nn.PReLU())
+@dataclass(frozen=True)
+class Sizes:
+    """The paper's sizes."""
+
+    width: int = WIDTH  # of every code, LSTM and Transformer
+    hidden: int = 512  # first layer of encoders and decoders
+    heads: int = HEADS
+    feed_forward: int = WIDTH
 
 
-def decoder(outputs):
+def encoder(inputs, sizes):
+    width, hidden = sizes.width, sizes.hidden
     return nn.Sequential(
-        nn.Linear(WIDTH, 512),
-        nn.PReLU(),
-        nn.Linear(512, WIDTH),
-        nn.PReLU(),
-        nn.Linear(WIDTH, outputs),
+        nn.Linear(inputs, hidden), nn.PReLU(), nn.Linear(hidden, width), nn.PReLU()
     )
 
 
-def sinusoidal_positions(dtype=torch.float64):
-    """[7, 256]: sin(p / 10000^(2i/256)) in column 2i, cos in column 2i + 1."""
+def decoder(outputs, sizes):
+    width, hidden = sizes.width, sizes.hidden
+    return nn.Sequential(
+        nn.Linear(width, hidden),
+        nn.PReLU(),
+        nn.Linear(hidden, width),
+        nn.PReLU(),
+        nn.Linear(width, outputs),
+    )
+
+
+def sinusoidal_positions(dtype=torch.float64, width=WIDTH):
+    """[7, width]: sin(p / 10000^(2i/width)) in column 2i, cos in column 2i + 1."""
     position = torch.arange(SEGMENT, dtype=torch.float64)[:, None]
-    rate = torch.exp(torch.arange(0, WIDTH, 2, dtype=torch.float64) * (-math.log(10000.0) / WIDTH))
-    table = torch.zeros(SEGMENT, WIDTH, dtype=torch.float64)
+    rate = torch.exp(torch.arange(0, width, 2, dtype=torch.float64) * (-math.log(10000.0) / width))
+    table = torch.zeros(SEGMENT, width, dtype=torch.float64)
     table[:, 0::2] = torch.sin(position * rate)
     table[:, 1::2] = torch.cos(position * rate)
     return table.to(dtype)
@@ -50,45 +65,45 @@ def sinusoidal_positions(dtype=torch.float64):
 class Controller(nn.Module):
     """Segments of what is given and of given and predicted mixed -> a code for the frame to predict."""
 
-    def __init__(self, inputs, dropout):
+    def __init__(self, inputs, dropout, sizes):
         super().__init__()
+        self.width = sizes.width
+        shape = (sizes.width, sizes.heads, sizes.feed_forward)
         options = dict(dropout=dropout, activation="relu", batch_first=True, norm_first=False)
-        self.target_projection = nn.Linear(inputs, WIDTH)
-        self.mixture_projection = nn.Linear(inputs, WIDTH)
+        self.target_projection = nn.Linear(inputs, sizes.width)
+        self.mixture_projection = nn.Linear(inputs, sizes.width)
         self.encoder = nn.TransformerEncoder(
-            nn.TransformerEncoderLayer(WIDTH, HEADS, WIDTH, **options),
-            2,
-            enable_nested_tensor=False,
+            nn.TransformerEncoderLayer(*shape, **options), 2, enable_nested_tensor=False
         )
-        self.decoder = nn.TransformerDecoder(
-            nn.TransformerDecoderLayer(WIDTH, HEADS, WIDTH, **options), 2
-        )
+        self.decoder = nn.TransformerDecoder(nn.TransformerDecoderLayer(*shape, **options), 2)
         for layer in [*self.encoder.layers, *self.decoder.layers]:
             layer.dropout = nn.Dropout(0.0)  # the one inside the feed-forward part
-        self.output = nn.Linear(WIDTH, WIDTH)
+        self.output = nn.Linear(sizes.width, sizes.width)
 
     def forward(self, target, mixture):
-        """target, mixture [B, 7, inputs] -> [B, 256]."""
-        positions = sinusoidal_positions(target.dtype)
+        """target, mixture [B, 7, inputs] -> [B, width]."""
+        positions = sinusoidal_positions(target.dtype, self.width)
         memory = self.encoder(self.target_projection(target) + positions)
-        decoded = self.decoder(self.mixture_projection(mixture) + positions, memory)  # [B, 7, 256]
+        decoded = self.decoder(
+            self.mixture_projection(mixture) + positions, memory
+        )  # [B, 7, width]
         return self.output(decoded[:, BEFORE])
 
 
 class Pan2021(nn.Module):
-    def __init__(self, statistics, dropout=0.1):
+    def __init__(self, statistics, dropout=0.1, sizes=Sizes()):
         super().__init__()
         self.statistics = statistics
-        self.state_encoder = encoder(77)
-        self.velocity_encoder = encoder(72)
-        self.target_controller = encoder(73)
-        self.position_encoder = nn.Sequential(nn.Linear(4, 512), nn.PReLU())
-        self.root_trajectory_controller = Controller(3, dropout)
-        self.velocity_factor_controller = Controller(5, dropout)
-        self.lstm1 = nn.LSTM(4 * WIDTH, WIDTH)
-        self.lstm2 = nn.LSTM(2 * WIDTH, WIDTH)
-        self.state_decoder = decoder(142)  # p^b, c, v^b
-        self.root_decoder = decoder(7)  # p^r, o^r, v^r
+        self.state_encoder = encoder(77, sizes)
+        self.velocity_encoder = encoder(72, sizes)
+        self.target_controller = encoder(73, sizes)
+        self.position_encoder = nn.Sequential(nn.Linear(4, 2 * sizes.width), nn.PReLU())
+        self.root_trajectory_controller = Controller(3, dropout, sizes)
+        self.velocity_factor_controller = Controller(5, dropout, sizes)
+        self.lstm1 = nn.LSTM(4 * sizes.width, sizes.width)
+        self.lstm2 = nn.LSTM(2 * sizes.width, sizes.width)
+        self.state_decoder = decoder(142, sizes)  # p^b, c, v^b
+        self.root_decoder = decoder(7, sizes)  # p^r, o^r, v^r
 
     def forward(self, window, ground_truth_fed=False):
         """window [N + 1, B, 154] -> standardised predictions of frames 1..N [N, B, 149].

@@ -14,7 +14,7 @@ from layout import (
     Statistics,
     velocity_factors,
 )
-from reference import Pan2021
+from reference import Pan2021, Sizes
 
 
 def raw_windows(frames, windows, generator):
@@ -70,10 +70,10 @@ def windows_and_statistics(frames, windows, seed):
     return statistics.standardised(features, slice(0, FEATURES)), statistics
 
 
-def random_model(statistics, seed, dropout=0.1):
+def random_model(statistics, seed, dropout=0.1, sizes=Sizes()):
     """The reference model, f64, with every parameter away from its neutral value."""
     generator = torch.Generator().manual_seed(seed)
-    model = Pan2021(statistics, dropout).double()
+    model = Pan2021(statistics, dropout, sizes).double()
     with torch.no_grad():
         for name, parameter in model.named_parameters():
             noise = torch.rand(parameter.shape, dtype=torch.float64, generator=generator) * 2 - 1
