@@ -17,10 +17,10 @@ from safetensors.torch import save_file
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts" / "pytorch_reference"))
 
-from layout import CONTACTS, FEATURES  # noqa: E402
-from losses import TERMS, losses  # noqa: E402
-from reference import Sizes  # noqa: E402
-from synthetic import random_model, raw_windows, statistics_of  # noqa: E402
+from layout import CONTACTS, FEATURES
+from losses import TERMS, losses
+from reference import Sizes
+from synthetic import random_model, raw_windows, statistics_of
 
 # No two alike, so that one taken for another shows.
 SIZES = Sizes(width=4, hidden=8, heads=2, feed_forward=6)

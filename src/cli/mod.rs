@@ -2,6 +2,7 @@
 
 mod bvh;
 mod features;
+mod gradcheck;
 
 use clap::{Parser, Subcommand};
 
@@ -19,6 +20,8 @@ enum Command {
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
+    /// Compare the gradient of a model's whole loss with central differences
+    Gradcheck(gradcheck::GradcheckArgs),
 }
 
 impl Cli {
@@ -30,6 +33,7 @@ impl Cli {
         match self.command {
             Command::Bvh(args) => bvh::run(args),
             Command::Features(args) => features::run(args),
+            Command::Gradcheck(args) => gradcheck::run(args),
         }
     }
 }
