@@ -362,3 +362,6 @@ pub(super) mod property {
         prop::collection::vec(0usize..5, 1..4).boxed()
     }
 }
+
+#[cfg(test)]
+mod mutations;
