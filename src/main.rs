@@ -1,14 +1,14 @@
 use std::process::ExitCode;
 
 use clap::Parser as _;
-use keydance::cli::Cli;
+use keydance::cli::{self, Cli};
 
 fn main() -> ExitCode {
     match Cli::parse().run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            cli::exit_code(&error)
         }
     }
 }

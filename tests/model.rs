@@ -354,7 +354,7 @@ fn gradients_are_right(config: &Pan2021Config) {
         let worst = report.parameters.iter().filter_map(|p| p.worst.as_ref());
         let worst = worst.max_by(|a, b| a.error.total_cmp(&b.error));
         assert!(report.error() < 1e-5, "{case:?}: {worst:?}");
-        assert!(report.compared() >= 100, "{case:?}");
+        assert!(report.parameters.iter().all(|p| p.compared + p.kinks > 0));
         assert!(50 * report.kinks() <= report.compared(), "{case:?}");
     }
 }

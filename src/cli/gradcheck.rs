@@ -1,14 +1,16 @@
 //! `keydance gradcheck`: a model's gradient against central differences, in f64.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
 use rayon::prelude::*;
 
 use crate::autograd::check::{CheckReport, ParameterReport};
+use crate::models::Feed;
 use crate::models::gradient_check::{GradientCase, GradientCheckConfig, check_model};
-use crate::models::{Feed, ModelConfig};
+use crate::training::ExperimentConfig;
 
 /// Largest error that passes.
 const TOLERANCE: f64 = 1e-5;
@@ -19,6 +21,11 @@ const TRANSITIONS: [usize; 2] = [12, 6];
 
 #[derive(Debug, Args)]
 pub struct GradcheckArgs {
+    /// Experiment whose model is checked, such as experiments/paper/one_lstm.toml; without one, the whole model
+    config: Option<PathBuf>,
+    /// Override a value of the config, such as model.loss.key=0
+    #[arg(long, value_name = "KEY=VALUE", requires = "config")]
+    set: Vec<String>,
     /// Frames to predict, instead of 12 and 6
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     frames: Option<u16>,
@@ -39,8 +46,15 @@ pub struct GradcheckArgs {
 /// # Errors
 /// The config cannot be read or has nothing to train; a gradient is wrong, or too many numbers could not be compared.
 pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
-    let model = ModelConfig::default();
-    let model = if args.full_size { model } else { model.small() };
+    let experiment = match &args.config {
+        Some(path) => ExperimentConfig::load(path, &args.set)?,
+        None => ExperimentConfig::default(),
+    };
+    let model = if args.full_size {
+        experiment.model
+    } else {
+        experiment.model.small()
+    };
     let config = GradientCheckConfig {
         windows: args.windows.into(),
         per_parameter: args.per_parameter,

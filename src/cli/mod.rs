@@ -3,8 +3,16 @@
 mod bvh;
 mod features;
 mod gradcheck;
+mod train;
+
+use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::training::TrainingError;
+
+/// Exit code of a training that ended because a loss or gradient was not finite.
+const DIVERGED: u8 = 3;
 
 /// Dance synthesis from keyframes.
 #[derive(Debug, Parser)]
@@ -22,18 +30,30 @@ enum Command {
     Features(features::FeaturesArgs),
     /// Compare the gradient of a model's whole loss with central differences
     Gradcheck(gradcheck::GradcheckArgs),
+    /// Train a model
+    Train(train::TrainArgs),
 }
 
 impl Cli {
-    /// Runs the subcommand.
+    /// Runs the subcommand. Returns the exit code.
     ///
     /// # Errors
     /// Whatever the subcommand could not do.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
-            Command::Bvh(args) => bvh::run(args),
-            Command::Features(args) => features::run(args),
-            Command::Gradcheck(args) => gradcheck::run(args),
+            Command::Bvh(args) => bvh::run(args)?,
+            Command::Features(args) => features::run(args)?,
+            Command::Gradcheck(args) => gradcheck::run(args)?,
+            Command::Train(args) => return train::run(args),
         }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The exit code of an error.
+pub fn exit_code(error: &anyhow::Error) -> ExitCode {
+    match error.downcast_ref() {
+        Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
+        _ => ExitCode::FAILURE,
     }
 }

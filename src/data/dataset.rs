@@ -205,7 +205,7 @@ fn digest<'a>(clips: impl Iterator<Item = &'a (DanceClip, String)>) -> String {
     hexadecimal(&Sha256::digest(list.as_bytes()))
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         // Writing to a String cannot fail.
         let _ = write!(text, "{byte:02x}");

@@ -9,6 +9,7 @@ pub mod window;
 pub mod windows;
 
 pub use config::{DataConfig, Split};
+pub(crate) use dataset::hexadecimal;
 pub use dataset::{DanceClip, DataError, Dataset};
 pub use standardise::Standardisation;
 pub use window::window_features;

@@ -9,6 +9,7 @@ pub mod pan2021;
 pub mod registry;
 pub mod trained;
 pub mod transition;
+pub mod weights;
 
 pub use network::{Batch, Feed, LossTerms, Network};
 pub use registry::ModelConfig;

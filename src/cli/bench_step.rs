@@ -1,0 +1,47 @@
+//! `keydance bench-step`: how fast a training step is on this machine.
+
+use clap::Args;
+
+use crate::training::{ExperimentConfig, measure::step_speed};
+
+/// What is timed.
+#[derive(Debug, Args)]
+pub struct BenchStepArgs {
+    /// Frames of a transition
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
+    frames: u16,
+    /// Windows in the batch
+    #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
+    batch: u16,
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Timed steps; the fastest counts
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    repetitions: u16,
+    /// Print one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Times the step of the paper's whole model.
+///
+/// # Errors
+/// No threads to be had.
+pub fn run(args: BenchStepArgs) -> anyhow::Result<()> {
+    let speed = step_speed(
+        &ExperimentConfig::default(),
+        args.frames.into(),
+        args.batch.into(),
+        args.threads.into(),
+        args.repetitions.into(),
+    )?;
+    if args.json {
+        println!("{}", serde_json::to_string(&speed)?);
+    } else {
+        println!(
+            "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
+            speed.batch, speed.frames, speed.threads, speed.seconds, speed.frame_steps_per_second
+        );
+    }
+    Ok(())
+}

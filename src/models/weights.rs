@@ -1,0 +1,308 @@
+//! Weights as a safetensors file that PyTorch loads: every parameter by its name in f32, what standardises the features
+//! (`feature_mean [154]`, `feature_std [154]`, `position_scale [1]`, `velocity_scale [1]`), and the config.
+//!
+//! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program that wrote the file).
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use ndarray::{ArrayD, IxDyn};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use thiserror::Error;
+
+use crate::autograd::Parameters;
+use crate::data::{Standardisation, hexadecimal};
+use crate::motion::features::FEATURES;
+
+const METADATA: &str = "keydance";
+const MEAN: &str = "feature_mean";
+const STD: &str = "feature_std";
+const POSITION_SCALE: &str = "position_scale";
+const VELOCITY_SCALE: &str = "velocity_scale";
+
+/// Why a file does not give the weights of a model.
+#[derive(Debug, Error)]
+pub enum WeightsError {
+    #[error("{path} cannot be read: {cause}")]
+    File {
+        path: PathBuf,
+        cause: std::io::Error,
+    },
+    #[error("{path} is not a whole safetensors file: {cause}")]
+    Format {
+        path: PathBuf,
+        cause: safetensors::SafeTensorError,
+    },
+    #[error("{path} was not written by keydance: {problem}")]
+    Foreign { path: PathBuf, problem: String },
+    #[error("{path} has no {name} {expected:?}, which the model of its config has")]
+    Missing {
+        path: PathBuf,
+        name: String,
+        expected: Vec<usize>,
+    },
+    #[error("{path} has {name} {found:?}, which the model of its config has not")]
+    Unknown {
+        path: PathBuf,
+        name: String,
+        found: Vec<usize>,
+    },
+    #[error("{path}: {name} is {found} in the file, {expected} in the model of its config")]
+    Shape {
+        path: PathBuf,
+        name: String,
+        found: String,
+        expected: String,
+    },
+    #[error("{path}: {name} {problem}")]
+    Value {
+        path: PathBuf,
+        name: &'static str,
+        problem: &'static str,
+    },
+    #[error("the weights cannot be written as safetensors")]
+    Serialise(#[from] safetensors::SafeTensorError),
+}
+
+#[derive(Serialize, Deserialize)]
+struct Metadata {
+    config: String,
+    version: String,
+}
+
+/// A weights file, read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavedWeights {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// The experiment's config, TOML.
+    pub config: String,
+    /// Version of keydance that wrote the file.
+    pub version: String,
+    pub standardisation: Standardisation,
+    parameters: BTreeMap<String, ArrayD<f32>>,
+}
+
+/// The content of a weights file; the same bytes for the same weights.
+///
+/// # Errors
+/// A header beyond the format's limits.
+pub fn to_safetensors(
+    parameters: &Parameters<f32>,
+    standardisation: &Standardisation,
+    config: &str,
+) -> Result<Vec<u8>, WeightsError> {
+    let single = |values: &[f64]| -> Vec<f32> { values.iter().map(|&x| x as f32).collect() };
+    let statistics = [
+        (MEAN, single(&standardisation.mean)),
+        (STD, single(&standardisation.std)),
+        (POSITION_SCALE, single(&[standardisation.position_scale])),
+        (VELOCITY_SCALE, single(&[standardisation.velocity_scale])),
+    ];
+    let tensors: Vec<(&str, Vec<usize>, Vec<u8>)> = parameters
+        .iter()
+        .map(|(name, value)| (name, value.shape().to_vec(), bytes(value.iter())))
+        .chain(
+            statistics
+                .iter()
+                .map(|(name, values)| (*name, vec![values.len()], bytes(values.iter()))),
+        )
+        .collect();
+    let views = tensors
+        .iter()
+        .map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)))
+        .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()?;
+    let metadata = serde_json::to_string(&Metadata {
+        config: config.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+    })
+    .map_err(safetensors::SafeTensorError::from)?;
+    // One entry only: several would be written in an order that changes from run to run.
+    let metadata = HashMap::from([(METADATA.to_string(), metadata)]);
+    Ok(safetensors::serialize(views, Some(metadata))?)
+}
+
+fn bytes<'a>(values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
+    values.flat_map(|x| x.to_le_bytes()).collect()
+}
+
+/// SHA-256 over names, shapes and values of all parameters, hexadecimal.
+pub fn digest(parameters: &Parameters<f32>) -> String {
+    let mut hash = Sha256::new();
+    for (name, value) in parameters.iter() {
+        hash.update(format!("{name} {:?}\n", value.shape()));
+        hash.update(bytes(value.iter()));
+    }
+    hexadecimal(&hash.finalize())
+}
+
+impl SavedWeights {
+    /// Reads a weights file.
+    ///
+    /// # Errors
+    /// It cannot be read, is damaged, or is not keydance's.
+    pub fn read(path: &Path) -> Result<Self, WeightsError> {
+        let content = std::fs::read(path).map_err(|cause| WeightsError::File {
+            path: path.into(),
+            cause,
+        })?;
+        Self::parse(&content, path)
+    }
+
+    /// The same from a file's content; `path` is what errors call it.
+    ///
+    /// # Errors
+    /// As [`SavedWeights::read`].
+    pub fn parse(content: &[u8], path: &Path) -> Result<Self, WeightsError> {
+        let damaged = |cause| WeightsError::Format {
+            path: path.into(),
+            cause,
+        };
+        let foreign = |problem| WeightsError::Foreign {
+            path: path.into(),
+            problem,
+        };
+        let (_, header) = SafeTensors::read_metadata(content).map_err(damaged)?;
+        let metadata = header
+            .metadata()
+            .as_ref()
+            .and_then(|entries| entries.get(METADATA))
+            .ok_or_else(|| foreign(format!("its metadata has no entry {METADATA:?}")))?;
+        let Metadata { config, version } = serde_json::from_str(metadata)
+            .map_err(|error| foreign(format!("its metadata entry {METADATA:?}: {error}")))?;
+        let tensors = SafeTensors::deserialize(content).map_err(damaged)?;
+        let mut parameters = BTreeMap::new();
+        for (name, view) in tensors.iter() {
+            parameters.insert(name.to_string(), array(path, name, &view)?);
+        }
+        let mut take = |name: &str, len: usize| -> Result<Vec<f64>, WeightsError> {
+            let missing = WeightsError::Missing {
+                path: path.into(),
+                name: name.into(),
+                expected: vec![len],
+            };
+            let array = parameters.remove(name).ok_or(missing)?;
+            check_shape(path, name, array.shape(), &[len])?;
+            Ok(array.iter().map(|&x| f64::from(x)).collect())
+        };
+        let standardisation = Standardisation {
+            mean: take(MEAN, FEATURES)?,
+            std: take(STD, FEATURES)?,
+            position_scale: take(POSITION_SCALE, 1)?[0],
+            velocity_scale: take(VELOCITY_SCALE, 1)?[0],
+        };
+        check_values(path, &standardisation)?;
+        Ok(Self {
+            path: path.into(),
+            config,
+            version,
+            standardisation,
+            parameters,
+        })
+    }
+
+    /// Puts the values into a model's parameters.
+    ///
+    /// # Errors
+    /// The file and the model do not have the same names and shapes; then nothing is changed.
+    pub fn load_into(&self, parameters: &mut Parameters<f32>) -> Result<(), WeightsError> {
+        for (name, value) in parameters.iter() {
+            let found = self
+                .parameters
+                .get(name)
+                .ok_or_else(|| WeightsError::Missing {
+                    path: self.path.clone(),
+                    name: name.into(),
+                    expected: value.shape().to_vec(),
+                })?;
+            check_shape(&self.path, name, found.shape(), value.shape())?;
+        }
+        let unknown = self
+            .parameters
+            .iter()
+            .find(|(name, _)| !parameters.iter().any(|(known, _)| known == *name));
+        if let Some((name, value)) = unknown {
+            return Err(WeightsError::Unknown {
+                path: self.path.clone(),
+                name: name.clone(),
+                found: value.shape().to_vec(),
+            });
+        }
+        for (name, value) in parameters.values_mut() {
+            if let Some(saved) = self.parameters.get(name) {
+                value.assign(saved);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn array(path: &Path, name: &str, view: &TensorView) -> Result<ArrayD<f32>, WeightsError> {
+    let misfit = |found: String| WeightsError::Shape {
+        path: path.into(),
+        name: name.into(),
+        found,
+        expected: "F32".into(),
+    };
+    if view.dtype() != Dtype::F32 {
+        return Err(misfit(view.dtype().to_string()));
+    }
+    let (chunks, _) = view.data().as_chunks::<4>();
+    let values = chunks
+        .iter()
+        .map(|bytes| f32::from_le_bytes(*bytes))
+        .collect();
+    ArrayD::from_shape_vec(IxDyn(view.shape()), values)
+        .map_err(|error| misfit(format!("{:?} ({error})", view.shape())))
+}
+
+fn check_shape(
+    path: &Path,
+    name: &str,
+    found: &[usize],
+    expected: &[usize],
+) -> Result<(), WeightsError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(WeightsError::Shape {
+            path: path.into(),
+            name: name.into(),
+            found: format!("{found:?}"),
+            expected: format!("{expected:?}"),
+        })
+    }
+}
+
+fn check_values(path: &Path, statistics: &Standardisation) -> Result<(), WeightsError> {
+    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
+    let positive = |values: &[f64]| finite(values) && values.iter().all(|&x| x > 0.0);
+    let checks = [
+        (MEAN, finite(&statistics.mean), "has a NaN or an infinity"),
+        (
+            STD,
+            positive(&statistics.std),
+            "has a number that is not above 0",
+        ),
+        (
+            POSITION_SCALE,
+            positive(&[statistics.position_scale]),
+            "is not above 0",
+        ),
+        (
+            VELOCITY_SCALE,
+            positive(&[statistics.velocity_scale]),
+            "is not above 0",
+        ),
+    ];
+    match checks.into_iter().find(|(_, valid, _)| !valid) {
+        None => Ok(()),
+        Some((name, _, problem)) => Err(WeightsError::Value {
+            path: path.into(),
+            name,
+            problem,
+        }),
+    }
+}

@@ -1,0 +1,447 @@
+//! Adam (Kingma and Ba, 2015), as PyTorch computes it.
+//!
+//! With g the gradient and t the number of the step, from 1:
+//!
+//! ```text
+//! m <- m + (1 - beta1) (g - m)
+//! v <- beta2 v + (1 - beta2) g^2
+//! w <- w - learning_rate / (1 - beta1^t) * m / (sqrt(v) / sqrt(1 - beta2^t) + epsilon)
+//! ```
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::autograd::kernels::vectorised;
+use crate::autograd::{Gradients, Parameters, Real};
+
+/// Numbers that one task works on; fixed, so that sums do not depend on the number of threads.
+const CHUNK: usize = 1 << 14;
+
+/// Adam's settings; the defaults are the paper's and, where it is silent, PyTorch's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AdamConfig {
+    pub learning_rate: f64,
+    /// Decay of the mean of gradients.
+    pub beta1: f64,
+    /// Decay of the mean of squared gradients.
+    pub beta2: f64,
+    /// Added to the denominator, after the square root.
+    pub epsilon: f64,
+    /// Longest gradient over all parameters together; a longer one is scaled down to it. Left out: no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clip_norm: Option<f64>,
+}
+
+impl Default for AdamConfig {
+    fn default() -> Self {
+        Self {
+            learning_rate: 1e-4,
+            beta1: 0.9,
+            beta2: 0.999,
+            epsilon: 1e-8,
+            clip_norm: None,
+        }
+    }
+}
+
+/// A gradient that holds a NaN or an infinity; no weight was changed.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("the gradient of {parameter} {shape:?} holds a NaN or an infinity")]
+pub struct NonFiniteGradient {
+    pub parameter: String,
+    pub shape: Vec<usize>,
+}
+
+/// The optimiser's state: two moments for every weight, and the number of steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adam<T> {
+    config: AdamConfig,
+    steps: u64,
+    /// m and v of each parameter, in its layout.
+    first: Vec<Vec<T>>,
+    second: Vec<Vec<T>>,
+}
+
+/// What is the same for all weights of a step.
+#[derive(Clone, Copy)]
+struct Factors<T> {
+    gradient: T,
+    first: T,
+    second: T,
+    square: T,
+    rate: T,
+    root: T,
+    epsilon: T,
+}
+
+impl<T: Real> Adam<T> {
+    /// Moments of zero for every parameter.
+    pub fn new(config: AdamConfig, parameters: &Parameters<T>) -> Self {
+        let zeros = || -> Vec<Vec<T>> {
+            parameters
+                .iter()
+                .map(|(_, value)| vec![T::zero(); value.len()])
+                .collect()
+        };
+        Self {
+            config,
+            steps: 0,
+            first: zeros(),
+            second: zeros(),
+        }
+    }
+
+    /// Steps done.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// m and v of each parameter, in the parameters' order.
+    pub fn moments(&self) -> [&[Vec<T>]; 2] {
+        [&self.first, &self.second]
+    }
+
+    /// Takes up a saved state. Gives it back where its sizes are not those of the parameters.
+    pub fn restore(
+        &mut self,
+        steps: u64,
+        moments: [Vec<Vec<T>>; 2],
+    ) -> Result<(), [Vec<Vec<T>>; 2]> {
+        let sizes = |moments: &[Vec<T>]| moments.iter().map(Vec::len).collect::<Vec<_>>();
+        let expected = sizes(&self.first);
+        if moments.iter().any(|moments| sizes(moments) != expected) {
+            return Err(moments);
+        }
+        [self.first, self.second] = moments;
+        self.steps = steps;
+        Ok(())
+    }
+
+    /// One step with the sum of the shards' gradients, added in their order; leaves every gradient at zero. Returns the norm of
+    /// the sum over all parameters. Runs on rayon's current pool; the result does not depend on its threads.
+    ///
+    /// # Errors
+    /// A gradient that is not finite; then no weight, no moment is changed, and the gradients are undefined.
+    ///
+    /// # Panics
+    /// When the gradients are of other parameters.
+    pub fn step(
+        &mut self,
+        parameters: &mut Parameters<T>,
+        shards: &mut [Gradients<T>],
+    ) -> Result<f64, NonFiniteGradient> {
+        let Some((sum, rest)) = shards.split_first_mut() else {
+            return Ok(0.0);
+        };
+        let norm = total_norm(parameters, add(sum, rest))?;
+        self.steps += 1;
+        let factors = self.factors(norm);
+        let chunks: Vec<_> = parameters
+            .values_mut()
+            .zip(sum.iter_mut())
+            .zip(self.first.iter_mut().zip(&mut self.second))
+            .flat_map(|(((_, w), g), (m, v))| {
+                let w = w.as_slice_mut().expect("a parameter is in standard layout");
+                assert!(
+                    w.len() == g.len() && w.len() == m.len(),
+                    "Adam's gradients are of the parameters that it was made for"
+                );
+                w.chunks_mut(CHUNK)
+                    .zip(g.chunks_mut(CHUNK))
+                    .zip(m.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)))
+            })
+            .collect();
+        chunks
+            .into_par_iter()
+            .for_each(|((w, g), (m, v))| update(factors, w, g, m, v));
+        Ok(norm)
+    }
+
+    fn factors(&self, norm: f64) -> Factors<T> {
+        let AdamConfig {
+            learning_rate,
+            beta1,
+            beta2,
+            epsilon,
+            clip_norm,
+        } = self.config;
+        let correction = |beta: f64| 1.0 - beta.powf(self.steps as f64);
+        let clip = clip_norm.map_or(1.0, |limit| (limit / (norm + 1e-6)).min(1.0));
+        Factors {
+            gradient: T::from_f64(clip),
+            first: T::from_f64(1.0 - beta1),
+            second: T::from_f64(beta2),
+            square: T::from_f64(1.0 - beta2),
+            rate: T::from_f64(learning_rate / correction(beta1)),
+            root: T::from_f64(1.0 / correction(beta2).sqrt()),
+            epsilon: T::from_f64(epsilon),
+        }
+    }
+}
+
+/// Adds the gradients of `rest` to `sum` and leaves those at zero. Returns the sum of squares of every parameter.
+fn add<T: Real>(sum: &mut Gradients<T>, rest: &mut [Gradients<T>]) -> Vec<f64> {
+    let mut rest: Vec<_> = rest.iter_mut().map(Gradients::iter_mut).collect();
+    let mut chunks = Vec::new();
+    for (parameter, sum) in sum.iter_mut().enumerate() {
+        let mut others: Vec<_> = rest
+            .iter_mut()
+            .filter_map(|shard| shard.next().map(|values| values.chunks_mut(CHUNK)))
+            .collect();
+        for sum in sum.chunks_mut(CHUNK) {
+            let others: Vec<_> = others.iter_mut().filter_map(Iterator::next).collect();
+            chunks.push((parameter, sum, others));
+        }
+    }
+    let squares: Vec<(usize, f64)> = chunks
+        .into_par_iter()
+        .map(|(parameter, sum, others)| {
+            for other in others {
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        for (sum, other) in sum.iter_mut().zip(other) {
+                            *sum += *other;
+                            *other = T::zero();
+                        }
+                    },
+                );
+            }
+            (parameter, sum_of_squares(sum))
+        })
+        .collect();
+    let count = squares.last().map_or(0, |(parameter, _)| parameter + 1);
+    let mut totals = vec![0.0; count];
+    for (parameter, square) in squares {
+        totals[parameter] += square;
+    }
+    totals
+}
+
+/// In f64, where no finite f32 has an infinite square: the sum is finite exactly if all f32 are.
+fn sum_of_squares<T: Real>(values: &[T]) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut lanes = [0.0; 8];
+            let (whole, rest) = values.as_chunks::<8>();
+            for values in whole {
+                for (lane, x) in lanes.iter_mut().zip(values) {
+                    let x = Real::to_f64(*x);
+                    *lane += x * x;
+                }
+            }
+            for (lane, x) in lanes.iter_mut().zip(rest) {
+                let x = Real::to_f64(*x);
+                *lane += x * x;
+            }
+            lanes.iter().sum()
+        },
+    )
+}
+
+fn total_norm<T: Real>(
+    parameters: &Parameters<T>,
+    squares: Vec<f64>,
+) -> Result<f64, NonFiniteGradient> {
+    let bad = parameters
+        .iter()
+        .zip(&squares)
+        .find(|(_, square)| !square.is_finite());
+    match bad {
+        Some(((name, value), _)) => Err(NonFiniteGradient {
+            parameter: name.into(),
+            shape: value.shape().to_vec(),
+        }),
+        None => Ok(squares.iter().sum::<f64>().sqrt()),
+    }
+}
+
+fn update<T: Real>(k: Factors<T>, w: &mut [T], g: &mut [T], m: &mut [T], v: &mut [T]) {
+    vectorised(
+        #[inline(always)]
+        || {
+            for ((w, g), (m, v)) in w.iter_mut().zip(g).zip(m.iter_mut().zip(v)) {
+                let gradient = *g * k.gradient;
+                *g = T::zero();
+                *m += (gradient - *m) * k.first;
+                *v = *v * k.second + gradient * gradient * k.square;
+                *w -= k.rate * *m / (v.sqrt() * k.root + k.epsilon);
+            }
+        },
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::ArrayD;
+
+    fn parameters<T: Real>(values: &[&[f64]]) -> Parameters<T> {
+        let mut parameters = Parameters::new();
+        for (k, values) in values.iter().enumerate() {
+            let value = values.iter().map(|&x| T::from_f64(x)).collect();
+            let value = ArrayD::from_shape_vec(vec![values.len()], value).unwrap();
+            parameters.add(format!("p{k}"), value);
+        }
+        parameters
+    }
+
+    fn gradients<T: Real>(
+        of: &Parameters<T>,
+        gradient: impl Fn(usize, usize) -> f64,
+    ) -> Gradients<T> {
+        let mut gradients = Gradients::zeros(of);
+        for (k, values) in gradients.iter_mut().enumerate() {
+            for (i, value) in values.iter_mut().enumerate() {
+                *value = T::from_f64(gradient(k, i));
+            }
+        }
+        gradients
+    }
+
+    fn weights<T: Real>(parameters: &Parameters<T>) -> Vec<f64> {
+        parameters
+            .iter()
+            .flat_map(|(_, v)| v.iter().map(|x| Real::to_f64(*x)))
+            .collect()
+    }
+
+    /// The published algorithm, one weight at a time.
+    fn naive(config: AdamConfig, w: f64, gradients: &[f64]) -> f64 {
+        let (mut w, mut m, mut v) = (w, 0.0, 0.0);
+        for (t, g) in gradients.iter().enumerate() {
+            let t = t as i32 + 1;
+            m = config.beta1 * m + (1.0 - config.beta1) * g;
+            v = config.beta2 * v + (1.0 - config.beta2) * g * g;
+            let (m_hat, v_hat) = (
+                m / (1.0 - config.beta1.powi(t)),
+                v / (1.0 - config.beta2.powi(t)),
+            );
+            w -= config.learning_rate * m_hat / (v_hat.sqrt() + config.epsilon);
+        }
+        w
+    }
+
+    #[test]
+    fn steps_follow_the_published_algorithm() {
+        let config = AdamConfig {
+            learning_rate: 0.01,
+            ..AdamConfig::default()
+        };
+        let start: Vec<f64> = (0..40_000).map(|i| (i as f64 * 0.37).sin()).collect();
+        let gradient = |t: usize, i: usize| {
+            ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6)
+        };
+        let mut parameters = parameters::<f64>(&[&start]);
+        let mut adam = Adam::new(config, &parameters);
+        for t in 0..20 {
+            // Two shards that add up to the gradient.
+            let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
+            let mut shards = [shard(0.25), shard(0.75)];
+            adam.step(&mut parameters, &mut shards).unwrap();
+            assert!(
+                shards
+                    .iter()
+                    .flat_map(|s| s.iter().flatten())
+                    .all(|&g| g == 0.0)
+            );
+        }
+        for (i, (w, start)) in weights(&parameters).into_iter().zip(start).enumerate() {
+            let history: Vec<f64> = (0..20).map(|t| gradient(t, i)).collect();
+            assert!(
+                (w - naive(config, start, &history)).abs() < 1e-12,
+                "weight {i}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_constant_gradient_moves_a_weight_by_the_learning_rate_a_step() {
+        // With g constant both corrected moments are exact: every step is rate * g / (|g| + eps).
+        let mut parameters = parameters::<f32>(&[&[1.0, 2.0, 3.0]]);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters);
+        for _ in 0..5 {
+            let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
+            adam.step(&mut parameters, &mut [gradients]).unwrap();
+        }
+        let expected = [1.0 - 5e-4, 2.0 + 5e-4, 3.0 - 2.5e-4];
+        for (w, expected) in weights(&parameters).into_iter().zip(expected) {
+            assert!((w - expected).abs() < 1e-6, "{w} is not {expected}");
+        }
+    }
+
+    #[test]
+    fn a_long_gradient_is_scaled_to_the_limit_over_all_parameters() {
+        let clipped = AdamConfig {
+            clip_norm: Some(1.0),
+            epsilon: 1.0,
+            ..AdamConfig::default()
+        };
+        let free = AdamConfig {
+            clip_norm: None,
+            ..clipped
+        };
+        let run = |config, scale: f64| {
+            let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
+            let mut adam = Adam::new(config, &parameters);
+            let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
+            let norm = adam.step(&mut parameters, &mut [gradients]).unwrap();
+            (norm, weights(&parameters))
+        };
+        let (norm, long) = run(clipped, 1.0);
+        assert!((norm - 5.0).abs() < 1e-12);
+        let scaled = run(free, 0.2).1;
+        assert!(
+            long.iter().zip(&scaled).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{long:?} {scaled:?}"
+        );
+        assert_eq!(run(clipped, 0.1).1, run(free, 0.1).1);
+    }
+
+    #[test]
+    fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
+        let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters);
+        let before = (weights(&parameters), adam.clone());
+        for bad in [f64::NAN, f64::INFINITY] {
+            let gradients = gradients(
+                &parameters,
+                |k, i| if (k, i) == (1, 17) { bad } else { 1e30 },
+            );
+            let error = adam.step(&mut parameters, &mut [gradients]).unwrap_err();
+            assert_eq!((error.parameter.as_str(), error.shape), ("p1", vec![20]));
+        }
+        assert_eq!((weights(&parameters), adam), before);
+    }
+
+    #[test]
+    fn the_bits_do_not_depend_on_the_number_of_threads() {
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let start: Vec<f64> = (0..100_000).map(|i| (i as f64).sin()).collect();
+            let mut parameters = parameters::<f32>(&[&start]);
+            let mut adam = Adam::new(
+                AdamConfig {
+                    clip_norm: Some(0.5),
+                    ..AdamConfig::default()
+                },
+                &parameters,
+            );
+            for t in 0..3 {
+                let mut shards: Vec<_> = (0..4)
+                    .map(|s| gradients(&parameters, |_, i| ((i + s * 31 + t) as f64).cos()))
+                    .collect();
+                pool.install(|| adam.step(&mut parameters, &mut shards))
+                    .unwrap();
+            }
+            weights(&parameters)
+        };
+        assert_eq!(run(1), run(3));
+    }
+}

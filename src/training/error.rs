@@ -1,0 +1,109 @@
+//! What can end a training before its end.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::checkpoint::CheckpointError;
+use super::config_file::ConfigError;
+use super::durable::FileError;
+use super::state::StateError;
+use crate::autograd::AutogradError;
+use crate::models::ModelError;
+use crate::models::weights::WeightsError;
+
+/// Why a training cannot begin, go on or be saved.
+#[derive(Debug, Error)]
+pub enum TrainingError {
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(
+        "the schedule has no step: no window of {min_len} to {max_len} frames at fraction {fraction} of {clips} training clips, the longest of \
+         {longest} frames; raise schedule.fraction or lower schedule.min_len"
+    )]
+    NothingToTrain {
+        min_len: usize,
+        max_len: usize,
+        fraction: f64,
+        clips: usize,
+        longest: usize,
+    },
+    #[error("no pool of {threads} threads: {cause}")]
+    Threads {
+        threads: usize,
+        cause: rayon::ThreadPoolBuildError,
+    },
+    /// An operation of the network refused its operands.
+    #[error("step {step} ({windows} windows of {length} frames): {cause}")]
+    Step {
+        step: u64,
+        windows: usize,
+        length: usize,
+        cause: Box<AutogradError>,
+    },
+    /// The training diverged. The weights are those before the step.
+    #[error(
+        "step {step} ({windows} windows of {length} frames) is not finite: {cause}; the last checkpoint is as it was; \
+         try a lower optimiser.learning_rate or optimiser.clip_norm=1.0"
+    )]
+    NonFinite {
+        /// Counted from 1.
+        step: u64,
+        windows: usize,
+        length: usize,
+        /// Operation and shapes.
+        cause: String,
+    },
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    #[error(transparent)]
+    State(#[from] StateError),
+    #[error("{path} holds a run already; go on with --resume, or give another --out")]
+    RunExists { path: PathBuf },
+    #[error(
+        "{path} holds a run with another config ({}); values there, values now; a run is resumed with the config and the --set \
+         that it was started with",
+        differences.join("; ")
+    )]
+    OtherConfig {
+        path: PathBuf,
+        differences: Vec<String>,
+    },
+    #[error(
+        "{path} was trained on data with digest {saved}, the data folder now has digest {found}"
+    )]
+    OtherData {
+        path: PathBuf,
+        saved: String,
+        found: String,
+    },
+    #[error("{path} belongs to a config with digest {saved}, the run's config has digest {found}")]
+    OtherRun {
+        path: PathBuf,
+        saved: String,
+        found: String,
+    },
+    #[error("no checkpoint of {path} can be used: {}", problems.join("; "))]
+    NoCheckpoint {
+        path: PathBuf,
+        problems: Vec<String>,
+    },
+    #[error(
+        "{path} is not there: the training is not finished; finish it with keydance train --resume"
+    )]
+    NotFinished { path: PathBuf },
+    #[error("{path} is not a manifest: {cause}")]
+    Manifest {
+        path: PathBuf,
+        cause: serde_json::Error,
+    },
+    #[error("{path} does not fit the model: {problem}")]
+    Checkpoint {
+        path: PathBuf,
+        problem: CheckpointError,
+    },
+}

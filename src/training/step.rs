@@ -1,0 +1,296 @@
+//! One step: a batch is cut and standardised, its shards run forwards and backwards, Adam moves the weights.
+
+use std::sync::{Mutex, PoisonError};
+
+use ndarray::{Array2, Array3, Axis};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::{Serialize, Serializer};
+
+use super::error::TrainingError;
+use super::schedule::{BatchPlan, parts};
+use super::streams::Streams;
+use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
+use crate::data::{Standardisation, Window, window_features};
+use crate::models::{Batch, Feed, Network};
+use crate::motion::features::FEATURES;
+use crate::optim::Adam;
+
+/// What one step did: a line of `log.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Steps done, this one included.
+    pub step: u64,
+    /// From 0.
+    pub epoch: usize,
+    /// Frames of a transition, N.
+    pub length: usize,
+    /// Windows in the batch.
+    pub batch: usize,
+    #[serde(serialize_with = "feed_name")]
+    pub feed: Feed,
+    /// Probability of the ground truth at this step.
+    pub beta: f64,
+    /// The loss that is minimised.
+    pub total: f64,
+    /// Its terms by name, not weighted.
+    #[serde(serialize_with = "by_name")]
+    pub losses: Vec<(&'static str, f64)>,
+    /// Norm of the gradient over all parameters, before any clipping.
+    pub gradient_norm: f64,
+    /// Frames predicted so far, this step's included.
+    pub frame_steps: u64,
+    /// Wall-clock time of the step.
+    pub seconds: f64,
+    pub frame_steps_per_second: f64,
+}
+
+fn feed_name<S: Serializer>(feed: &Feed, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(match feed {
+        Feed::GroundTruth => "ground_truth",
+        Feed::Predictions => "predictions",
+    })
+}
+
+fn by_name<S: Serializer>(
+    losses: &[(&'static str, f64)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(losses.iter().copied())
+}
+
+/// The training clips, and how their windows become network input.
+pub(super) struct TrainingWindows<'d> {
+    /// `[frames, 154]` each, not standardised.
+    pub clips: Vec<&'d Array2<f64>>,
+    pub standardisation: Standardisation,
+}
+
+impl TrainingWindows<'_> {
+    /// Standardised features of windows of `length` + 1 frames, `[length + 1, windows, 154]`.
+    fn cut(&self, windows: &[Window], length: usize) -> Array3<f32> {
+        let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
+        for (k, window) in windows.iter().enumerate() {
+            let cut = window_features(self.clips[window.clip], window.start, length);
+            features.index_axis_mut(Axis(1), k).assign(
+                &self
+                    .standardisation
+                    .standardise(cut.view())
+                    .mapv(|x| x as f32),
+            );
+        }
+        features
+    }
+}
+
+/// What a step is given.
+pub(super) struct StepInput<'s> {
+    pub network: &'s dyn Network<f32>,
+    pub windows: &'s TrainingWindows<'s>,
+    pub streams: Streams,
+    /// Steps done before.
+    pub step: u64,
+    pub plan: &'s BatchPlan,
+    pub feed: Feed,
+}
+
+/// Losses of a batch or of a shard of it.
+#[derive(Debug, Default)]
+pub(super) struct Losses {
+    pub total: f64,
+    pub terms: Vec<(&'static str, f64)>,
+}
+
+/// Threads and buffers that one step leaves for the next.
+pub(super) struct Stepper {
+    pool: ThreadPool,
+    workspaces: Mutex<Vec<Workspace<f32>>>,
+    /// One for each shard, zero between steps.
+    gradients: Vec<Gradients<f32>>,
+}
+
+impl Stepper {
+    pub fn new(
+        parameters: &Parameters<f32>,
+        shards: usize,
+        threads: usize,
+    ) -> Result<Self, TrainingError> {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|cause| TrainingError::Threads { threads, cause })?;
+        Ok(Self {
+            pool,
+            workspaces: Mutex::new(Vec::new()),
+            gradients: vec![Gradients::zeros(parameters); shards],
+        })
+    }
+
+    /// Computes the batch and moves the weights. Returns the losses before the move, and the norm of the gradient.
+    ///
+    /// # Errors
+    /// The network refuses the batch; or a loss or gradient is not finite, and then weights and moments are as before.
+    pub fn step(
+        &mut self,
+        input: &StepInput<'_>,
+        parameters: &mut Parameters<f32>,
+        adam: &mut Adam<f32>,
+    ) -> Result<(Losses, f64), TrainingError> {
+        let result = self.try_step(input, parameters, adam);
+        if result.is_err() {
+            self.gradients.iter_mut().for_each(Gradients::set_zero);
+        }
+        result
+    }
+
+    fn try_step(
+        &mut self,
+        input: &StepInput<'_>,
+        parameters: &mut Parameters<f32>,
+        adam: &mut Adam<f32>,
+    ) -> Result<(Losses, f64), TrainingError> {
+        let shards: Vec<&[Window]> = parts(input.plan.windows.len(), self.gradients.len())
+            .map(|range| &input.plan.windows[range])
+            .collect();
+        let (workspaces, gradients) = (&self.workspaces, &mut self.gradients);
+        let (before, pool) = (&*parameters, &self.pool);
+        let losses: Vec<Result<Losses, AutogradError>> = pool.install(|| {
+            gradients
+                .par_iter_mut()
+                .zip(&shards)
+                .enumerate()
+                .filter(|(_, (_, windows))| !windows.is_empty())
+                .map(|(shard, (gradients, windows))| {
+                    let free = workspaces
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .pop();
+                    let mut workspace = free.unwrap_or_default();
+                    let losses = run_shard(
+                        input,
+                        before,
+                        &mut workspace,
+                        shard,
+                        windows,
+                        gradients,
+                        false,
+                    );
+                    workspaces
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push(workspace);
+                    losses
+                })
+                .collect()
+        });
+        let mut sum = Losses::default();
+        for losses in losses {
+            let losses = losses.map_err(|cause| failure(input, cause))?;
+            sum.total += losses.total;
+            if sum.terms.is_empty() {
+                sum.terms = losses.terms;
+            } else {
+                for ((_, sum), (_, term)) in sum.terms.iter_mut().zip(losses.terms) {
+                    *sum += term;
+                }
+            }
+        }
+        let norm = self
+            .pool
+            .install(|| adam.step(parameters, &mut self.gradients));
+        match norm {
+            Ok(norm) => Ok((sum, norm)),
+            Err(error) => {
+                let cause = self
+                    .trace(input, parameters, &shards)
+                    .map_or_else(|| error.to_string(), |cause| cause.to_string());
+                Err(non_finite(input, cause))
+            }
+        }
+    }
+
+    /// Runs the shards once more, slowly, to find the first operation whose gradient is not finite.
+    fn trace(
+        &mut self,
+        input: &StepInput<'_>,
+        parameters: &Parameters<f32>,
+        shards: &[&[Window]],
+    ) -> Option<AutogradError> {
+        let mut workspace = Workspace::new();
+        let with_windows = shards
+            .iter()
+            .enumerate()
+            .filter(|(_, windows)| !windows.is_empty());
+        with_windows
+            .zip(&mut self.gradients)
+            .find_map(|((shard, windows), gradients)| {
+                run_shard(
+                    input,
+                    parameters,
+                    &mut workspace,
+                    shard,
+                    windows,
+                    gradients,
+                    true,
+                )
+                .err()
+            })
+    }
+}
+
+/// Losses of a shard; its gradients are added to `gradients`.
+fn run_shard(
+    input: &StepInput<'_>,
+    parameters: &Parameters<f32>,
+    workspace: &mut Workspace<f32>,
+    shard: usize,
+    windows: &[Window],
+    gradients: &mut Gradients<f32>,
+    trace: bool,
+) -> Result<Losses, AutogradError> {
+    let batch = Batch {
+        features: input.windows.cut(windows, input.plan.length),
+        total_windows: input.plan.windows.len(),
+    };
+    let mut tape = Tape::recording(parameters, workspace)
+        .with_dropout(input.streams.dropout(input.step, shard));
+    if trace {
+        tape = tape.with_trace();
+    }
+    let losses = input.network.losses(&mut tape, &batch, input.feed)?;
+    let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
+    let values = Losses {
+        total: number(losses.total),
+        terms: losses
+            .terms
+            .iter()
+            .map(|&(name, var)| (name, number(var)))
+            .collect(),
+    };
+    if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {
+        tape.check_finite()?;
+    }
+    tape.backward(losses.total, gradients)?;
+    Ok(values)
+}
+
+fn failure(input: &StepInput<'_>, cause: AutogradError) -> TrainingError {
+    match cause {
+        AutogradError::NonFinite { .. } => non_finite(input, cause.to_string()),
+        cause => TrainingError::Step {
+            step: input.step + 1,
+            windows: input.plan.windows.len(),
+            length: input.plan.length,
+            cause: Box::new(cause),
+        },
+    }
+}
+
+fn non_finite(input: &StepInput<'_>, cause: String) -> TrainingError {
+    TrainingError::NonFinite {
+        step: input.step + 1,
+        windows: input.plan.windows.len(),
+        length: input.plan.length,
+        cause,
+    }
+}

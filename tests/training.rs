@@ -1,0 +1,435 @@
+//! Training on small data with a small network: the same bits however it is run, and nothing lost when it stops.
+
+mod common;
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use common::training::{config, dataset, trainer, trainer_of};
+use keydance::models::weights::SavedWeights;
+use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
+use keydance::training::{
+    ExperimentConfig, Outcome, RunFolder, RunState, StepReport, Trainer, TrainingError,
+};
+
+/// Trains until `stop` steps are done, or to the end.
+fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: Option<u64>) -> Vec<StepReport> {
+    let mut reports = Vec::new();
+    let outcome = trainer
+        .run(run, &mut |report| {
+            reports.push(report.clone());
+            if Some(report.step) == stop {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+    let stopped = stop.is_some_and(|stop| stop < trainer.schedule().steps());
+    assert_eq!(outcome == Outcome::Stopped, stopped);
+    reports
+}
+
+/// A report without what the clock says.
+fn numbers(report: &StepReport) -> StepReport {
+    StepReport {
+        seconds: 0.0,
+        frame_steps_per_second: 0.0,
+        ..report.clone()
+    }
+}
+
+#[test]
+fn weights_and_losses_are_the_same_to_the_bit_with_one_and_three_threads() {
+    let data = dataset();
+    let run = |threads| {
+        let mut trainer = trainer(&data, threads);
+        let reports = train(&mut trainer, None, Some(30));
+        assert_eq!(reports.len(), 30);
+        (
+            reports.iter().map(numbers).collect::<Vec<_>>(),
+            trainer.weights_file().unwrap(),
+        )
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn both_feeds_are_drawn_and_the_loss_falls() {
+    let data = dataset();
+    let reports = train(&mut trainer(&data, 2), None, None);
+    let feeds = |beta: fn(f64) -> bool| reports.iter().filter(|r| beta(r.beta)).count();
+    assert!(feeds(|beta| beta > 0.5) > 5 && feeds(|beta| beta < 0.5) > 5);
+    let predicted = reports
+        .iter()
+        .filter(|r| r.feed == keydance::models::Feed::Predictions);
+    assert!((5..reports.len() - 5).contains(&predicted.count()));
+    let mean = |reports: &[StepReport]| {
+        reports.iter().map(|r| r.total).sum::<f64>() / reports.len() as f64
+    };
+    let (first, last) = (mean(&reports[..10]), mean(&reports[reports.len() - 10..]));
+    assert!(last < 0.8 * first, "{first} became {last}");
+}
+
+#[test]
+fn a_resumed_training_ends_at_the_same_bits_wherever_it_stopped() {
+    let data = dataset();
+    let mut whole = trainer(&data, 2);
+    let expected: Vec<_> = train(&mut whole, None, None).iter().map(numbers).collect();
+    let steps = whole.schedule().steps();
+    let epoch_starts: Vec<u64> = (0..steps)
+        .filter(|&step| step > 0 && whole.schedule().place(step).1 == 0)
+        .collect();
+    // At the end of the first epoch, where the shortest length grows (every 2 epochs), and inside epochs.
+    let grows = epoch_starts
+        .iter()
+        .copied()
+        .find(|&step| whole.schedule().place(step).0 == 2)
+        .unwrap();
+    for stop in [1, epoch_starts[0], grows, grows + 1, steps - 1, steps] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let mut before = trainer(&data, 2);
+        let run = RunFolder::create(&path, before.config()).unwrap();
+        let mut reports = train(&mut before, Some(&run), Some(stop));
+        drop(before);
+        let mut after = trainer(&data, 1);
+        let run = RunFolder::resume(&path, after.config()).unwrap();
+        assert_eq!(after.resume(&run).unwrap().steps, stop);
+        reports.extend(train(&mut after, Some(&run), None));
+        let reports: Vec<_> = reports.iter().map(numbers).collect();
+        assert_eq!(reports, expected, "stopped after step {stop}");
+        assert_eq!(after.weights_file().unwrap(), whole.weights_file().unwrap());
+        assert_eq!(
+            fs::read(run.weights()).unwrap(),
+            whole.weights_file().unwrap()
+        );
+        let manifest = run.manifest().unwrap().unwrap();
+        assert_eq!(
+            (manifest.state, manifest.steps_done),
+            (RunState::Finished, steps)
+        );
+        assert_eq!(manifest.weights_digest, Some(whole.weights_digest()));
+        assert_eq!(logged_steps(&path), (1..=steps).collect::<Vec<_>>());
+    }
+}
+
+fn logged_steps(run: &Path) -> Vec<u64> {
+    let text = fs::read_to_string(run.join("log.jsonl")).unwrap();
+    text.lines()
+        .map(|line| {
+            let line: serde_json::Value = serde_json::from_str(line).unwrap();
+            assert!(line["losses"]["reconstruction"].is_number(), "{line}");
+            line["step"].as_u64().unwrap()
+        })
+        .collect()
+}
+
+/// A run with checkpoints after steps 10 and 20 that was killed after step 23.
+fn killed_run(folder: &Path) -> PathBuf {
+    let data = dataset();
+    let mut trainer = trainer(&data, 2);
+    let path = folder.join("run");
+    let run = RunFolder::create(&path, trainer.config()).unwrap();
+    let killed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        trainer.run(Some(&run), &mut |report| {
+            if report.step == 23 {
+                std::panic::resume_unwind(Box::new("killed"));
+            }
+            ControlFlow::Continue(())
+        })
+    }));
+    assert!(killed.is_err());
+    assert_eq!(logged_steps(&path), (1..=23).collect::<Vec<_>>());
+    path
+}
+
+fn finish(path: &Path) -> Result<(u64, Vec<String>, String), TrainingError> {
+    let data = dataset();
+    let mut trainer = trainer(&data, 2);
+    let run = RunFolder::resume(path, trainer.config())?;
+    let resumed = trainer.resume(&run)?;
+    train(&mut trainer, Some(&run), None);
+    assert_eq!(
+        logged_steps(path),
+        (1..=trainer.schedule().steps()).collect::<Vec<_>>()
+    );
+    Ok((resumed.steps, resumed.damaged, trainer.weights_digest()))
+}
+
+fn uninterrupted() -> String {
+    let data = dataset();
+    let mut trainer = trainer(&data, 2);
+    train(&mut trainer, None, None);
+    trainer.weights_digest()
+}
+
+#[test]
+fn a_killed_training_goes_on_from_the_newest_whole_checkpoint() {
+    let expected = uninterrupted();
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    // What a kill in the middle of a checkpoint and of a log line leaves.
+    let partial = path.join("checkpoints/step-00000030.partial");
+    fs::create_dir(&partial).unwrap();
+    fs::write(partial.join(STATE_FILE), "half").unwrap();
+    let log = path.join("log.jsonl");
+    fs::write(&log, fs::read_to_string(&log).unwrap() + "{\"step\": 2").unwrap();
+    assert_eq!(finish(&path).unwrap(), (20, vec![], expected));
+    assert!(!partial.exists());
+    assert_eq!(list(&path.join("checkpoints")).unwrap().len(), 2);
+}
+
+#[test]
+fn a_damaged_checkpoint_is_set_aside_for_the_one_before() {
+    let expected = uninterrupted();
+    for file in [STATE_FILE, WEIGHTS_FILE] {
+        for damage in [cut_off as fn(&Path), flip_a_byte, fs_remove] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = killed_run(folder.path());
+            damage(&path.join("checkpoints/step-00000020").join(file));
+            let (steps, damaged, digest) = finish(&path).unwrap();
+            assert_eq!((steps, &digest), (10, &expected));
+            assert!(
+                damaged.len() == 1 && damaged[0].contains(file),
+                "{damaged:?}"
+            );
+        }
+    }
+}
+
+fn cut_off(path: &Path) {
+    let content = fs::read(path).unwrap();
+    fs::write(path, &content[..content.len() / 2]).unwrap();
+}
+
+fn flip_a_byte(path: &Path) {
+    let mut content = fs::read(path).unwrap();
+    let at = content.len() / 2;
+    content[at] ^= 1;
+    fs::write(path, content).unwrap();
+}
+
+fn fs_remove(path: &Path) {
+    fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_run_without_a_whole_checkpoint_names_what_is_wrong_with_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    flip_a_byte(&path.join("checkpoints/step-00000020").join(STATE_FILE));
+    cut_off(&path.join("checkpoints/step-00000010").join(WEIGHTS_FILE));
+    let text = finish(&path).unwrap_err().to_string();
+    for words in [
+        "no checkpoint",
+        "step-00000020/state.bin",
+        "checksum",
+        "step-00000010/weights.safetensors",
+    ] {
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn a_run_killed_before_its_first_checkpoint_begins_again() {
+    let expected = uninterrupted();
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    fs::remove_dir_all(path.join("checkpoints")).unwrap();
+    assert_eq!(finish(&path).unwrap(), (0, vec![], expected.clone()));
+    assert_eq!(
+        finish(&folder.path().join("none")).unwrap(),
+        (0, vec![], expected)
+    );
+}
+
+#[test]
+fn a_folder_with_a_run_is_not_begun_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    let text = RunFolder::create(&path, &config()).unwrap_err().to_string();
+    assert!(text.contains("--resume") && text.contains("run"), "{text}");
+}
+
+#[test]
+fn a_run_of_another_config_or_other_data_is_refused_with_both_sides() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    let mut other = config();
+    other.optimiser.learning_rate = 0.5;
+    let text = RunFolder::resume(&path, &other).unwrap_err().to_string();
+    assert!(
+        text.contains("optimiser.learning_rate: 0.01, 0.5"),
+        "{text}"
+    );
+
+    let mut data = dataset();
+    data.digest = "other".into();
+    let mut trainer = trainer(&data, 1);
+    let run = RunFolder::resume(&path, trainer.config()).unwrap();
+    let text = trainer.resume(&run).unwrap_err().to_string();
+    assert!(
+        text.contains("digest synthetic") && text.contains("digest other"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_loss_that_is_not_finite_stops_the_training_and_leaves_the_checkpoints() {
+    let data = dataset();
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = config();
+    config.optimiser.learning_rate = 1e30;
+    config.checkpoint.every_steps = 1;
+    let mut trainer = trainer_of(config.clone(), &data, 2);
+    let run = RunFolder::create(&folder.path().join("run"), &config).unwrap();
+    let error = trainer
+        .run(Some(&run), &mut |_| ControlFlow::Continue(()))
+        .unwrap_err();
+    assert!(matches!(error, TrainingError::NonFinite { .. }), "{error}");
+    let text = error.to_string();
+    let step = trainer.steps_done() + 1;
+    assert!(text.contains(&format!("step {step} ")), "{text}");
+    assert!(
+        text.contains("operation") && text.contains("shape ["),
+        "{text}"
+    );
+    assert_eq!(run.manifest().unwrap().unwrap().state, RunState::Diverged);
+    let (newest, path) = list(&run.checkpoints()).unwrap().pop().unwrap();
+    assert_eq!(newest, trainer.steps_done());
+    assert!(SavedWeights::read(&path.join(WEIGHTS_FILE)).is_ok());
+}
+
+#[test]
+fn weights_of_another_model_are_refused_with_both_shapes() {
+    let data = dataset();
+    let mut small = trainer(&data, 1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("w.safetensors");
+    fs::write(&path, small.weights_file().unwrap()).unwrap();
+    let saved = SavedWeights::read(&path).unwrap();
+    assert_eq!(
+        ExperimentConfig::parse(&saved.config, "metadata").unwrap(),
+        *small.config()
+    );
+    let mut parameters = common::training::parameters(7);
+    let text = saved.load_into(&mut parameters).unwrap_err().to_string();
+    assert!(
+        text.contains("hidden.weight is [8, 154] in the file, [7, 154]"),
+        "{text}"
+    );
+
+    train(&mut small, None, Some(3));
+    let mut parameters = common::training::parameters(8);
+    saved.load_into(&mut parameters).unwrap();
+    let digest = keydance::models::weights::digest(&parameters);
+    assert_eq!(digest, trainer(&data, 1).weights_digest());
+    assert_ne!(digest, small.weights_digest());
+}
+
+#[test]
+fn mutated_weights_files_are_errors_or_whole_and_never_panic() {
+    let data = dataset();
+    let content = trainer(&data, 1).weights_file().unwrap();
+    let path = Path::new("w.safetensors");
+    assert!(SavedWeights::parse(&content, path).is_ok());
+    for at in (0..content.len()).step_by(97).chain(0..600) {
+        let mut changed = content.clone();
+        changed[at] ^= 0x55;
+        if let Ok(saved) = SavedWeights::parse(&changed, path) {
+            let mut parameters = common::training::parameters(8);
+            let _ = saved.load_into(&mut parameters);
+        }
+        assert!(SavedWeights::parse(&content[..at], path).is_err());
+    }
+    let mut huge = content.clone();
+    huge[..8].copy_from_slice(&(1u64 << 60).to_le_bytes());
+    assert!(SavedWeights::parse(&huge, path).is_err());
+}
+
+#[test]
+fn clips_shorter_than_every_window_are_an_error_that_says_what_to_do() {
+    let data = dataset();
+    let mut config = config();
+    config.schedule.min_len = 1000;
+    config.schedule.max_len = 1000;
+    let error = common::training::try_trainer(config, &data, 1)
+        .err()
+        .unwrap();
+    let text = error.to_string();
+    assert!(
+        text.contains("1000") && text.contains("schedule.min_len"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_papers_configs_load_and_differ_from_the_whole_model_by_their_name_and_one_field() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/paper");
+    let load = |name: &str| ExperimentConfig::load(&folder.join(name), &[]).unwrap();
+    let whole = load("whole_model.toml");
+    assert_eq!(whole, ExperimentConfig::default());
+    for (name, field) in [
+        ("one_lstm", "model.lstms: 2, 1"),
+        (
+            "condition_fc",
+            "model.controllers: \"transformer\", \"fully_connected\"",
+        ),
+        ("one_decoder", "model.decoders: 2, 1"),
+        (
+            "without_velocity_factor",
+            "model.velocity_factor: true, false",
+        ),
+        ("without_key_loss", "model.loss.key: 0.2, 0.0"),
+    ] {
+        let ablation = load(&format!("{name}.toml"));
+        let named = format!("name: \"whole_model\", \"{name}\"");
+        assert_eq!(
+            whole.differences(&ablation).unwrap(),
+            [field.to_string(), named]
+        );
+    }
+    let data = dataset();
+    let interpolation = load("interpolation.toml");
+    assert_eq!(interpolation.name, "interpolation");
+    let error = Trainer::new(interpolation, &data, 1)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(error.contains("no training"), "{error}");
+}
+
+#[test]
+fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
+    let data = dataset();
+    let sets = [
+        "hidden=8",
+        "code=4",
+        "heads=2",
+        "feed_forward=4",
+        "encoder_layers=1",
+        "decoder_layers=1",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("small.toml");
+    fs::write(
+        &file,
+        "schedule = { min_len = 3, max_len = 4, fraction = 0.1, batch_size = 8 }",
+    )
+    .unwrap();
+    let sets: Vec<String> = sets.iter().map(|set| format!("model.{set}")).collect();
+    let config = ExperimentConfig::load(&file, &sets).unwrap();
+    let mut trainer = Trainer::new(config.clone(), &data, 2).unwrap();
+    let run = RunFolder::create(&folder.path().join("run"), &config).unwrap();
+    assert!(run.model().err().unwrap().to_string().contains("--resume"));
+    train(&mut trainer, Some(&run), None);
+    let loaded = run.model().unwrap();
+    let digest = keydance::models::weights::digest(loaded.parameters());
+    assert_eq!(digest, trainer.weights_digest());
+    assert_eq!(
+        keydance::models::weights::digest(trainer.into_model().parameters()),
+        digest
+    );
+}
