@@ -6,6 +6,7 @@ mod bvh;
 mod evaluate;
 mod evaluation_record;
 mod features;
+mod gradcheck;
 mod progress;
 mod tables;
 mod threads;
@@ -39,6 +40,8 @@ enum Command {
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
+    /// Compare the gradient of a model's whole loss with central differences
+    Gradcheck(gradcheck::GradcheckArgs),
     /// Train a model
     Train(train::TrainArgs),
     /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
@@ -58,6 +61,7 @@ impl Cli {
             Command::BenchStep(args) => bench_step::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
+            Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => evaluate::run(args)?,
             Command::Tables(args) => tables::run(args)?,

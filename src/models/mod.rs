@@ -2,6 +2,7 @@
 //!
 //! Evaluation and synthesis know a model by this trait only, training by [`Network`].
 
+pub mod gradient_check;
 pub mod interpolation;
 pub mod network;
 pub mod pan2021;

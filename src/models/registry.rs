@@ -50,6 +50,14 @@ impl ModelConfig {
         }
     }
 
+    /// The same structure in small sizes, for checks in f64.
+    pub fn small(&self) -> Self {
+        match self {
+            Self::Pan2021(config) => Self::Pan2021(config.small()),
+            Self::Interpolation(_) => self.clone(),
+        }
+    }
+
     /// The model, where it needs no training.
     pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn TransitionModel>> {
         match self {

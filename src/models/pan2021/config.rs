@@ -90,6 +90,17 @@ impl Default for Pan2021Config {
 }
 
 impl Pan2021Config {
+    /// The same structure in small sizes (8 numbers a code, 2 heads), for checks in f64.
+    pub fn small(&self) -> Self {
+        Self {
+            hidden: 8,
+            code: 8,
+            heads: 2,
+            feed_forward: 8,
+            ..self.clone()
+        }
+    }
+
     pub(super) fn transformer(&self) -> TransformerSizes {
         TransformerSizes {
             width: self.code,

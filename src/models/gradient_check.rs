@@ -1,0 +1,135 @@
+//! The gradient of a model's whole loss, end to end through time, against central differences in f64.
+
+use ndarray::{Array3, Axis};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+use super::{Batch, Feed, ModelConfig, ModelError};
+use crate::autograd::check::{CheckReport, check_parameters};
+use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
+use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
+use crate::data::{DanceClip, DataConfig, DataError, Standardisation, window_features};
+use crate::motion::features::FEATURES;
+use crate::nn::Initialiser;
+
+/// Frames of a generated clip beyond those of a window.
+const SPARE_FRAMES: usize = 120;
+/// Uniform noise on every weight, so that none stands at a special value such as 0.
+const NOISE: f64 = 0.1;
+/// Key of the dropout masks.
+const DROPOUT_KEY: u64 = 0x5eed;
+
+/// One way to compute a model's loss.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GradientCase {
+    /// N, frames from k1 to k2.
+    pub transition: usize,
+    pub feed: Feed,
+    /// Whether dropout acts, with the same masks at every evaluation.
+    pub dropout: bool,
+}
+
+/// How a gradient check is drawn and how much of it is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GradientCheckConfig {
+    /// Windows in the batch.
+    pub windows: usize,
+    /// Most numbers of each parameter that are compared.
+    pub per_parameter: usize,
+    /// Seed of motion and weights.
+    pub seed: u64,
+}
+
+/// Why a gradient could not be checked.
+#[derive(Debug, Error)]
+pub enum GradientCheckError {
+    #[error("a gradient check needs at least one frame and one window")]
+    Empty,
+    #[error(transparent)]
+    Choreography(#[from] ChoreographyError),
+    #[error(transparent)]
+    Data(#[from] DataError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Autograd(#[from] AutogradError),
+}
+
+/// Windows of generated dance, standardised `[transition + 1, windows, 154]`, each from a clip of its own, and the statistics of
+/// those clips.
+///
+/// # Errors
+/// No frames or no windows; more frames than can be generated.
+pub fn generated_windows(
+    transition: usize,
+    windows: usize,
+    seed: u64,
+) -> Result<(Array3<f64>, Standardisation), GradientCheckError> {
+    if transition == 0 || windows == 0 {
+        return Err(GradientCheckError::Empty);
+    }
+    let clips = generate(&ChoreographyConfig {
+        clips: windows,
+        frames_per_clip: transition.saturating_add(SPARE_FRAMES),
+        seed,
+    })?;
+    let clips = clips
+        .into_iter()
+        .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let standardisation = Standardisation::fit(clips.iter().map(|clip| clip.features.view()));
+    let mut features = Array3::zeros((transition + 1, windows, FEATURES));
+    for (window, clip) in clips.iter().enumerate() {
+        let cut = window_features(&clip.features, SPARE_FRAMES / 2, transition);
+        let cut = standardisation.standardise(cut.view());
+        features.index_axis_mut(Axis(1), window).assign(&cut);
+    }
+    Ok((features, standardisation))
+}
+
+/// Compares the gradient of a model's total loss with central differences.
+///
+/// # Errors
+/// A model that is not trained, or whose settings do not fit together; nothing to check it on.
+pub fn check_model(
+    model: &ModelConfig,
+    case: GradientCase,
+    config: GradientCheckConfig,
+) -> Result<CheckReport, GradientCheckError> {
+    let (features, standardisation) =
+        generated_windows(case.transition, config.windows, config.seed)?;
+    let batch = Batch {
+        features,
+        total_windows: config.windows,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+    let mut parameters = Parameters::<f64>::new();
+    let network = model.build(
+        &mut Initialiser::new(&mut parameters, &mut rng),
+        &standardisation,
+    )?;
+    for (_, value) in parameters.values_mut() {
+        value.mapv_inplace(|x| x + rng.random_range(-NOISE..NOISE));
+    }
+    let key = case.dropout.then_some(DROPOUT_KEY);
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    tape.set_dropout(key);
+    let total = network.losses(&mut tape, &batch, case.feed)?.total;
+    tape.check_finite()?;
+    tape.backward(total, &mut gradients)?;
+    let report = check_parameters(
+        &mut parameters,
+        &gradients,
+        config.per_parameter,
+        |parameters| {
+            let mut tape = Tape::inference(parameters, &mut workspace);
+            tape.set_dropout(key);
+            let total = network.losses(&mut tape, &batch, case.feed)?.total;
+            Ok(tape.values(total)[0])
+        },
+    )?;
+    Ok(report)
+}
