@@ -37,7 +37,10 @@ def main():
     time.add_argument("--batch", type=int, default=128)
     time.add_argument("--rounds", type=int, default=5, help="turns; the best of each counts")
     time.add_argument(
-        "--plain-up-to", type=int, default=30, help="most frames for the plain version"
+        "--others-up-to",
+        type=int,
+        default=30,
+        help="most frames for the plain version and threaded products, which take the most memory",
     )
 
     commands.add_parser("selftest", help="plain against optimised version, random weights, f64")

@@ -20,6 +20,7 @@ from training import OneProcess, Shards
 DROPOUT = 0.1
 THREADS = 2
 CHUNK = 1  # frames that the encoder takes at once in training; more does not fit the caches
+SHARDED = "optimised, two processes"
 GENERATED = 60  # frames of a generated transition
 
 
@@ -88,7 +89,7 @@ def time_training(arguments, trainers):
         work = frames * arguments.batch
         runs = {}
         for name, trainer in trainers.items():
-            if name != "plain" or frames <= arguments.plain_up_to:
+            if name == SHARDED or frames <= arguments.others_up_to:
                 trainer.step(window)  # compiles, allocates
                 runs[name] = partial(lambda t: work / seconds(lambda: t.step(window)), trainer)
         if arguments.keydance:
@@ -156,10 +157,10 @@ def time_all(arguments):
     trainers = {
         "plain": OneProcess(*make("plain", False, DROPOUT, rank=0)),
         "optimised, threaded products": OneProcess(*make("optimised", fuse, DROPOUT, rank=0)),
-        "optimised, two processes": Shards(partial(make, "optimised", fuse, DROPOUT), THREADS),
+        SHARDED: Shards(partial(make, "optimised", fuse, DROPOUT), THREADS),
     }
     time_training(arguments, trainers)
-    trainers["optimised, two processes"].close()
+    trainers[SHARDED].close()
     for count, threads in ((1, 1), (64, THREADS)):
         time_generation(arguments, fuse, count, threads)
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
