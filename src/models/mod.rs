@@ -4,6 +4,7 @@
 
 pub mod gradient_check;
 pub mod interpolation;
+pub mod measure;
 pub mod network;
 pub mod pan2021;
 pub mod registry;

@@ -1,6 +1,6 @@
 //! How fast a training step is: the very step that a training runs, on made-up windows.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
@@ -13,12 +13,86 @@ use super::step::{StepInput, Stepper, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{Standardisation, Window};
-use crate::models::Feed;
+use crate::models::{Feed, Network};
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
 use crate::optim::Adam;
 
-/// Time of a training step: forward, losses, backward and Adam, own predictions fed back, dropout on.
+/// A training step that can be timed again and again: forward, losses, backward and Adam, own predictions fed back, dropout on.
+pub struct MeasuredStep {
+    streams: Streams,
+    network: Box<dyn Network<f32>>,
+    parameters: Parameters<f32>,
+    standardisation: Standardisation,
+    clip: Array2<f64>,
+    adam: Adam<f32>,
+    stepper: Stepper,
+    plan: BatchPlan,
+    done: u64,
+}
+
+impl MeasuredStep {
+    /// Steps of the config's model on `batch` windows of `frames` + 1 frames.
+    ///
+    /// # Errors
+    /// A config that has nothing to train, no threads to be had.
+    pub fn new(
+        config: &ExperimentConfig,
+        frames: usize,
+        batch: usize,
+        threads: usize,
+    ) -> Result<Self, TrainingError> {
+        let streams = Streams::new(config.seed);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(config.seed);
+        let clip = Array2::from_shape_simple_fn((frames + batch, FEATURES), || {
+            rng.random_range(-1.0..1.0)
+        });
+        let standardisation = Standardisation::fit([clip.view()]);
+        let mut parameters = Parameters::new();
+        let mut init = Initialiser::new(&mut parameters, streams.initialisation());
+        let network = config.model.build(&mut init, &standardisation)?;
+        Ok(Self {
+            streams,
+            network,
+            adam: Adam::new(config.optimiser, &parameters),
+            stepper: Stepper::new(&parameters, config.schedule.shards, threads)?,
+            parameters,
+            standardisation,
+            clip,
+            plan: BatchPlan {
+                length: frames,
+                windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
+            },
+            done: 0,
+        })
+    }
+
+    /// Does one step and says how long it took.
+    ///
+    /// # Errors
+    /// A loss or gradient that is not finite.
+    pub fn run(&mut self) -> Result<Duration, TrainingError> {
+        let windows = TrainingWindows {
+            clips: vec![&self.clip],
+            standardisation: self.standardisation.clone(),
+        };
+        let input = StepInput {
+            network: &*self.network,
+            windows: &windows,
+            streams: self.streams,
+            step: self.done,
+            plan: &self.plan,
+            feed: Feed::Predictions,
+        };
+        let start = Instant::now();
+        self.stepper
+            .step(&input, &mut self.parameters, &mut self.adam)?;
+        self.done += 1;
+        Ok(start.elapsed())
+    }
+}
+
+/// Speed of a training step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepSpeed {
     /// N, frames of a transition.
@@ -36,7 +110,7 @@ pub struct StepSpeed {
 /// Times `repetitions` steps after one to warm up.
 ///
 /// # Errors
-/// A config that has nothing to train.
+/// As [`MeasuredStep::new`] and [`MeasuredStep::run`].
 pub fn step_speed(
     config: &ExperimentConfig,
     frames: usize,
@@ -44,46 +118,16 @@ pub fn step_speed(
     threads: usize,
     repetitions: usize,
 ) -> Result<StepSpeed, TrainingError> {
-    let streams = Streams::new(config.seed);
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(config.seed);
-    let clip = Array2::from_shape_simple_fn((frames + batch, FEATURES), || {
-        rng.random_range(-1.0..1.0)
-    });
-    let standardisation = Standardisation::fit([clip.view()]);
-    let mut parameters = Parameters::new();
-    let mut init = Initialiser::new(&mut parameters, streams.initialisation());
-    let network = config.model.build(&mut init, &standardisation)?;
-    let windows = TrainingWindows {
-        clips: vec![&clip],
-        standardisation,
-    };
-    let mut adam = Adam::new(config.optimiser, &parameters);
-    let shards = config.schedule.shards;
-    let mut stepper = Stepper::new(&parameters, shards, threads)?;
-    let plan = BatchPlan {
-        length: frames,
-        windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
-    };
+    let mut step = MeasuredStep::new(config, frames, batch, threads)?;
+    step.run()?;
     let mut seconds = f64::INFINITY;
-    for step in 0..=repetitions as u64 {
-        let input = StepInput {
-            network: &*network,
-            windows: &windows,
-            streams,
-            step,
-            plan: &plan,
-            feed: Feed::Predictions,
-        };
-        let start = Instant::now();
-        stepper.step(&input, &mut parameters, &mut adam)?;
-        if step > 0 {
-            seconds = seconds.min(start.elapsed().as_secs_f64());
-        }
+    for _ in 0..repetitions {
+        seconds = seconds.min(step.run()?.as_secs_f64());
     }
     Ok(StepSpeed {
         frames,
         batch,
-        shards,
+        shards: config.schedule.shards,
         threads,
         seconds,
         frame_steps_per_second: (frames * batch) as f64 / seconds,
