@@ -2,16 +2,16 @@
 //!
 //! The modules in reading order, the path of the data:
 //!
-//! - [`motion`]: BVH files become clips, clips become the features of each frame.
-//! - [`data`]: clips become a data set: split, standardised, cut into windows.
-//! - [`autograd`]: reverse-mode differentiation on a tape, and the kernels under it.
-//! - [`nn`]: layers of weights, built on the tape's operations.
-//! - [`optim`]: Adam.
-//! - [`models`]: what fills the frames between two keyframes, behind one trait.
-//! - [`training`]: curriculum, scheduled sampling, losses, the loop, checkpoints.
-//! - [`evaluation`]: LRP, AVF and ART by the paper's protocol, and its tables.
-//! - [`report`]: figures of losses, scores and dancers.
-//! - [`cli`]: the subcommands of the binary.
+//! - [`motion`] - BVH files become clips, clips become the features of each frame.
+//! - [`data`] - clips become a data set: split, standardised, cut into windows.
+//! - [`autograd`] - reverse-mode differentiation on a tape, and the kernels under it.
+//! - [`nn`] - layers of weights, built on the tape's operations.
+//! - [`optim`] - Adam.
+//! - [`models`] - what fills the frames between two keyframes, behind one trait.
+//! - [`training`] - curriculum, scheduled sampling, losses, the loop, checkpoints.
+//! - [`evaluation`] - LRP, AVF and ART by the paper's protocol, and its tables.
+//! - [`report`] - figures of losses, scores and dancers.
+//! - [`cli`] - the subcommands of the binary.
 #![deny(unsafe_code)]
 
 pub mod autograd;

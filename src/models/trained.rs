@@ -86,7 +86,7 @@ impl TrainedModel {
             .lock()
             .map(|mut free| free.pop())
             .unwrap_or_default()
-            .unwrap_or_else(Workspace::new);
+            .unwrap_or_default();
         let predicted = {
             let mut tape = Tape::inference(&self.parameters, &mut workspace);
             self.network.predict(&mut tape, &inputs)

@@ -1,6 +1,8 @@
 //! Scaling and shifting by constants.
 //!
+//! ```text
 //! y = scale x + shift; dX = scale dY.
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

@@ -1,10 +1,12 @@
 //! Multi-head attention over many small windows, as one kernel.
 //!
+//! ```text
 //! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq], k and v rows [windows * tk], each head h
 //! has columns h * dh .. (h + 1) * dh. For each window and head:
 //! S = Q K^T / sqrt(dh) [tq, tk], P = softmax(S), D = dropout(P), Y = D V.
 //! dV = D^T dY, dD = dY V^T, dP = dropout(dD) with the same mask, dS = P (dP - rowsum(dP P)),
 //! dQ = dS K / sqrt(dh), dK = dS^T Q / sqrt(dh).
+//! ```
 //!
 //! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole vectors.
 

@@ -1,6 +1,8 @@
 //! Clamping to an interval.
 //!
+//! ```text
 //! y = min(max(x, low), high); dX = dY inside the interval, 0 outside.
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

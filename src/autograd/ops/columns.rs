@@ -1,6 +1,8 @@
 //! Columns: a range of the last axis.
 //!
+//! ```text
 //! x [.., n] -> y [.., width], y[.., j] = x[.., start + j]; dX is dY there and 0 elsewhere.
+//! ```
 
 use std::ops::Range;
 

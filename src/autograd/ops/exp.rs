@@ -1,6 +1,8 @@
 //! Exponential.
 //!
+//! ```text
 //! y = exp(x); dX = dY * y.
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

@@ -1,7 +1,9 @@
 //! A fully connected layer, with its bias and, where asked for, ReLU.
 //!
+//! ```text
 //! x [.., in], W [out, in], b [out] -> y [.., out] = f(x W^T + b), f the identity or max(., 0);
 //! with dZ = dY f': dX = dZ W, dW = dZ^T x, db = sum over rows of dZ.
+//! ```
 
 use super::shapes_error;
 use crate::autograd::kernels::{

@@ -1,6 +1,8 @@
 //! Matrix product.
 //!
+//! ```text
 //! A [m, k], B [k, n] -> C [m, n] = A B; dA = dC B^T, dB = A^T dC.
+//! ```
 
 use super::shapes_error;
 use crate::autograd::kernels::{Mat, MatMut, product, product_at, product_bt};

@@ -1,5 +1,6 @@
 //! Multi-head attention of one query a window, with the keys' and values' projections inside.
 //!
+//! ```text
 //! With a single query the projections of the keys and values need not be made: q . (W_k x) = (W_k^T q) . x and
 //! sum_j p_j W_v x_j = W_v sum_j p_j x_j. q [B, d] (projected), x [B * n, d'], for each head W_k, W_v [dh, d'], b_v [d]:
 //! u = q_h W_k [d'], s_j = u . x_j / sqrt(dh), p = softmax(s), m = dropout(p), z = sum_j m_j x_j,
@@ -7,6 +8,7 @@
 //! (The keys' bias adds the same number to every score of a window, which the softmax ignores.)
 //! dz = W_v^T dy_h, dm_j = dz . x_j + b_v,h . dy_h, ds by dropout and softmax, du = sum_j ds_j x_j / sqrt(dh),
 //! dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du, dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
+//! ```
 
 use super::attention::padded_softmax;
 use super::softmax::softmax_backward;

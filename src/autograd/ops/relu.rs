@@ -1,6 +1,8 @@
 //! Rectified linear unit.
 //!
+//! ```text
 //! y = max(x, 0); dX = dY where x > 0, else 0.
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! The same numbers under another shape.
 //!
+//! ```text
 //! y = x; dX = dY.
+//! ```
 
 use super::shapes_error;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Rows: a range of the first axis.
 //!
+//! ```text
 //! x [n, ..] -> y [height, ..], y[i, ..] = x[start + i, ..]; dX is dY there and 0 elsewhere.
+//! ```
 
 use std::ops::Range;
 

@@ -1,6 +1,8 @@
 //! Logistic function.
 //!
+//! ```text
 //! y = 1 / (1 + exp(-x)); dX = dY * y * (1 - y).
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

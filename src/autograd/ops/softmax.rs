@@ -1,6 +1,8 @@
 //! Softmax along the last axis.
 //!
+//! ```text
 //! x [.., n] -> y [.., n], y_j = exp(x_j - max) / sum_k exp(x_k - max); dX_j = y_j (dY_j - sum_k dY_k y_k).
+//! ```
 
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{Backward, Operation, Real, Tape, Var};
@@ -23,7 +25,7 @@ impl<T: Real> Operation<T> for Softmax {
     }
 }
 
-/// exp(x - max) in place for one row; returns the sum.
+/// x - max in place for one row.
 #[inline(always)]
 fn shifted<T: Real>(x: &mut [T]) {
     let mut max = T::neg_infinity();
@@ -33,7 +35,7 @@ fn shifted<T: Real>(x: &mut [T]) {
         }
     }
     for x in x {
-        *x = *x - max;
+        *x -= max;
     }
 }
 

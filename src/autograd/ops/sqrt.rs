@@ -1,6 +1,8 @@
 //! Square root.
 //!
+//! ```text
 //! y = sqrt(x); dX = dY / (2 y).
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

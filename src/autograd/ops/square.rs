@@ -1,6 +1,8 @@
 //! Square.
 //!
+//! ```text
 //! y = x^2; dX = dY * 2 x.
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Values of one shape on top of each other, along a new first axis.
 //!
+//! ```text
 //! x_i [..] -> y [parts, ..]; dX_i = dY[i].
+//! ```
 
 use super::{argument_error, shapes_error};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Every n-th row: one token of each window.
 //!
+//! ```text
 //! x [n * step, ..] -> y [n, ..], y[i] = x[start + i step]; dX is dY there and 0 elsewhere.
+//! ```
 
 use super::argument_error;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Difference of two values.
 //!
+//! ```text
 //! c = a - b, with a and b broadcast to c's shape; dA = dC, dB = -dC, summed over the broadcast axes.
+//! ```
 
 use super::broadcast::{add_reduced, broadcast_shape, zip_into};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};

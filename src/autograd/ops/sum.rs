@@ -1,6 +1,8 @@
 //! Sum of all numbers.
 //!
+//! ```text
 //! x [..] -> y [1]; dX = dY everywhere.
+//! ```
 
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{Backward, Operation, Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Sum along the last axis.
 //!
+//! ```text
 //! x [.., n] -> y [..]; dX[.., j] = dY[..].
+//! ```
 
 use super::argument_error;
 use crate::autograd::reduce::sum_with;

@@ -1,6 +1,8 @@
 //! Hyperbolic tangent.
 //!
+//! ```text
 //! y = tanh(x); dX = dY * (1 - y^2).
+//! ```
 
 use super::unary::unary;
 use crate::autograd::{Real, Tape, Var};

@@ -1,6 +1,8 @@
 //! Euclidean norm along the last axis, smooth at 0.
 //!
+//! ```text
 //! x [.., n] -> y [..], y = sqrt(x . x + eps); dX = dY x / y.
+//! ```
 
 use super::argument_error;
 use crate::autograd::reduce::sum_with;

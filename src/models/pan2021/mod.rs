@@ -1,10 +1,10 @@
 //! Diverse Dance Synthesis via Keyframes with Transformer Controllers (Pan et al. 2021).
 //!
-//! - [`config`]: sizes and ablations;
-//! - [`controller`]: root trajectory and velocity factor controllers (figure 3);
-//! - [`network`]: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
-//! - [`losses`]: eq. 3 to 11;
-//! - [`units`]: from standardised numbers to centimetres on the tape.
+//! - `config`: sizes and ablations;
+//! - `controller`: root trajectory and velocity factor controllers (figure 3);
+//! - `network`: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
+//! - `losses`: eq. 3 to 11;
+//! - `units`: from standardised numbers to centimetres on the tape.
 //!
 //! `docs/model.md` fixes shapes, names and units.
 

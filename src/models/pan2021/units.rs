@@ -165,11 +165,12 @@ fn factor_map(mean: &[f64], std: &[f64]) -> Affine {
 /// Each bone's vector from the joints' positions, `[69, 69]`.
 fn bone_map() -> Array2<f64> {
     let mut map = Array2::zeros((3 * (JOINTS - 1), 3 * (JOINTS - 1)));
-    for joint in 1..JOINTS {
+    for (joint, parent) in DANCE_PARENTS.into_iter().enumerate().skip(1) {
         for axis in 0..3 {
             let row = 3 * (joint - 1) + axis;
             map[[row, row]] = 1.0;
-            if let Some(parent) = DANCE_PARENTS[joint].filter(|&parent| parent > 0) {
+            // The root stands at 0.
+            if let Some(parent) = parent.filter(|&parent| parent > 0) {
                 map[[row, 3 * (parent - 1) + axis]] = -1.0;
             }
         }
