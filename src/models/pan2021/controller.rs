@@ -54,19 +54,29 @@ pub(super) struct Trajectory<T> {
     pub(super) windows: usize,
 }
 
-impl<T: Real> Trajectory<T> {
-    fn frame(&self, frame: usize) -> &[T] {
-        let len = self.values.len() / self.frames.max(1);
-        &self.values[frame * len..(frame + 1) * len]
-    }
-}
-
 /// A controller at work on one tape.
 pub(super) struct Session<'c, T> {
-    controller: &'c Controller,
+    segments: Segments<T>,
+    kind: SessionKind<'c>,
+}
+
+enum SessionKind<'c> {
+    Transformer(Box<Coder<'c>>),
+    FullyConnected(&'c Mlp),
+}
+
+/// A trajectory cut into segments of u frames.
+struct Segments<T> {
     trajectory: Trajectory<T>,
-    composed: Option<Composed>,
-    /// Coded target segments of the frames from `first` on.
+    channels: usize,
+    window: usize,
+}
+
+/// A Transformer controller at work.
+struct Coder<'c> {
+    transformer: &'c TransformerController,
+    composed: Composed,
+    /// Coded target segments of the frames from its first on.
     memory: Option<Memory>,
 }
 
@@ -144,45 +154,54 @@ impl Controller {
         tape: &mut Tape<'_, T>,
         trajectory: Trajectory<T>,
     ) -> Result<Session<'_, T>, AutogradError> {
-        let composed = match &self.kind {
-            Kind::FullyConnected(_) => None,
+        let kind = match &self.kind {
+            Kind::FullyConnected(mlp) => SessionKind::FullyConnected(mlp),
             Kind::Transformer(transformer) => {
-                let (windows, u) = (trajectory.windows, self.window);
-                let one_hot = (0..u)
-                    .map(|position| {
-                        tape.constant_with(&[windows, u], |out| {
-                            out.fill(T::zero());
-                            for row in out.chunks_exact_mut(u) {
-                                row[position] = T::one();
-                            }
-                        })
-                    })
-                    .collect();
-                Some(Composed {
-                    one_hot,
-                    target: transformer.compose(
-                        tape,
-                        transformer.target_projection,
-                        transformer.encoder[0].self_attention.in_projection,
-                    )?,
-                    mixture: transformer.compose(
-                        tape,
-                        transformer.mixture_projection,
-                        transformer.decoder[0].self_attention.in_projection,
-                    )?,
-                })
+                let composed = transformer.compose_both(tape, trajectory.windows)?;
+                SessionKind::Transformer(Box::new(Coder {
+                    transformer,
+                    composed,
+                    memory: None,
+                }))
             }
         };
         Ok(Session {
-            controller: self,
-            trajectory,
-            composed,
-            memory: None,
+            segments: Segments {
+                trajectory,
+                channels: self.channels,
+                window: self.window,
+            },
+            kind,
         })
     }
 }
 
 impl TransformerController {
+    fn compose_both<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        windows: usize,
+    ) -> Result<Composed, AutogradError> {
+        let u = self.positions.nrows();
+        let one_hot = (0..u)
+            .map(|position| {
+                tape.constant_with(&[windows, u], |out| {
+                    out.fill(T::zero());
+                    for row in out.chunks_exact_mut(u) {
+                        row[position] = T::one();
+                    }
+                })
+            })
+            .collect();
+        let encoder = &self.encoder[0].self_attention;
+        let decoder = &self.decoder[0].self_attention;
+        Ok(Composed {
+            one_hot,
+            target: self.compose(tape, self.target_projection, encoder.in_projection)?,
+            mixture: self.compose(tape, self.mixture_projection, decoder.in_projection)?,
+        })
+    }
+
     /// The weights from (numbers, one-hot position) to tokens and to their first projections.
     fn compose<T: Real>(
         &self,
@@ -264,14 +283,121 @@ impl TransformerController {
     }
 }
 
-impl<T: Real> Session<'_, T> {
+impl<T: Real> Segments<T> {
+    fn frame(&self, frame: usize) -> &[T] {
+        let len = self.trajectory.windows * self.channels;
+        &self.trajectory.values[frame * len..(frame + 1) * len]
+    }
+
     /// Frame of segment position `j` for the prediction of frame `t + 1`.
-    fn segment_frame(&self, t: usize, j: usize) -> usize {
+    fn frame_at(&self, t: usize, j: usize) -> usize {
         (t + 1 + j)
-            .saturating_sub(self.controller.window / 2)
+            .saturating_sub(self.window / 2)
             .min(self.trajectory.frames - 1)
     }
 
+    /// Writes the target segments of all windows for the prediction of frame `t + 1`, each token followed by `gap` numbers that
+    /// are left alone.
+    fn write_target(&self, t: usize, out: &mut [T], gap: usize) {
+        let (u, c) = (self.window, self.channels);
+        for (window, out) in out.chunks_exact_mut(u * (c + gap)).enumerate() {
+            for (j, token) in out.chunks_exact_mut(c + gap).enumerate() {
+                let frame = self.frame(self.frame_at(t, j));
+                token[..c].copy_from_slice(&frame[window * c..(window + 1) * c]);
+            }
+        }
+    }
+
+    /// The mixture segment for the prediction of frame `t + 1`, one `[windows, c]` a position.
+    fn mixture(&self, tape: &mut Tape<'_, T>, t: usize, fed: impl Fn(usize) -> Var) -> Vec<Var> {
+        (0..self.window)
+            .map(|j| {
+                let frame = self.frame_at(t, j);
+                if frame <= t {
+                    return fed(frame);
+                }
+                let shape = [self.trajectory.windows, self.channels];
+                tape.constant_with(&shape, |out| out.copy_from_slice(self.frame(frame)))
+            })
+            .collect()
+    }
+}
+
+impl Coder<'_> {
+    /// The code of the mixture segment for the prediction of frame `t + 1`.
+    fn code<T: Real>(
+        &mut self,
+        tape: &mut Tape<'_, T>,
+        segments: &Segments<T>,
+        t: usize,
+        mixture: Vec<Var>,
+    ) -> Result<Var, AutogradError> {
+        let (u, c) = (segments.window, segments.channels);
+        let rows = segments.trajectory.windows * u;
+        let memory = match self.memory.take() {
+            Some(memory) if (memory.first..memory.first + memory.frames).contains(&t) => memory,
+            _ => self.encode(tape, segments, t)?,
+        };
+        let parts: Vec<Var> = mixture
+            .into_iter()
+            .zip(&self.composed.one_hot)
+            .flat_map(|(values, &one_hot)| [values, one_hot])
+            .collect();
+        let mixture = tape.concat(&parts)?;
+        let mixture = tape.reshape(mixture, &[rows, c + u])?;
+        let mut of_frame = |all: Var| {
+            if memory.frames == 1 {
+                return Ok(all);
+            }
+            let from = (t - memory.first) * rows;
+            tape.rows(all, from..from + rows)
+        };
+        let tokens = of_frame(memory.tokens)?;
+        let projected = memory
+            .projected
+            .iter()
+            .map(|&all| of_frame(all))
+            .collect::<Result<Vec<_>, _>>()?;
+        self.memory = Some(memory);
+        let embedding = self.composed.mixture;
+        self.transformer
+            .decode(tape, embedding, mixture, tokens, &projected)
+    }
+
+    /// Codes the target segments for the prediction of frame `t + 1`, and of some frames after it where windows are few.
+    fn encode<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        segments: &Segments<T>,
+        t: usize,
+    ) -> Result<Memory, AutogradError> {
+        let (u, c) = (segments.window, segments.channels);
+        let windows = segments.trajectory.windows;
+        let left = segments.trajectory.frames - 1 - t;
+        let frames = (WINDOWS_AT_ONCE / windows.max(1)).clamp(1, left.max(1));
+        let rows = windows * u;
+        let targets = tape.constant_with(&[frames * rows, c + u], |out| {
+            out.fill(T::zero());
+            let width = rows * (c + u);
+            for (k, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+                segments.write_target(t + k, out, u);
+            }
+            for (row, token) in out.chunks_exact_mut(c + u).enumerate() {
+                token[c + row % u] = T::one();
+            }
+        });
+        let embedding = self.composed.target;
+        let (tokens, projected) = self.transformer.encode(tape, embedding, targets, u)?;
+        Ok(Memory {
+            first: t,
+            frames,
+            tokens,
+            projected,
+        })
+    }
+}
+
+impl<T: Real> Session<'_, T> {
     /// How many of the last fed frames a mixture segment holds.
     pub(super) fn past(window: usize) -> usize {
         window / 2
@@ -285,114 +411,31 @@ impl<T: Real> Session<'_, T> {
         t: usize,
         fed: impl Fn(usize) -> Var,
     ) -> Result<Var, AutogradError> {
-        let (u, c) = (self.controller.window, self.controller.channels);
-        let windows = self.trajectory.windows;
-        let mut mixture = Vec::with_capacity(u);
-        for j in 0..u {
-            let frame = self.segment_frame(t, j);
-            mixture.push(if frame <= t {
-                fed(frame)
-            } else {
-                let values = self.trajectory.frame(frame);
-                tape.constant_with(&[windows, c], |out| out.copy_from_slice(values))
-            });
-        }
-        match &self.controller.kind {
-            Kind::FullyConnected(mlp) => {
-                let target = tape.constant_with(&[windows, u * c], |out| {
-                    self.write_segments(t, out, 0);
+        let segments = &self.segments;
+        let mixture = segments.mixture(tape, t, fed);
+        match &mut self.kind {
+            SessionKind::FullyConnected(mlp) => {
+                let width = segments.window * segments.channels;
+                let target = tape.constant_with(&[segments.trajectory.windows, width], |out| {
+                    segments.write_target(t, out, 0);
                 });
-                let mut parts = vec![target];
-                parts.append(&mut mixture);
-                let segments = tape.concat(&parts)?;
-                mlp.forward(tape, segments)
+                let parts: Vec<Var> = std::iter::once(target).chain(mixture).collect();
+                let both = tape.concat(&parts)?;
+                mlp.forward(tape, both)
             }
-            Kind::Transformer(transformer) => {
-                self.remember(tape, transformer, t)?;
-                let (Some(composed), Some(memory)) = (&self.composed, &self.memory) else {
-                    unreachable!("a Transformer controller has both");
-                };
-                let parts: Vec<Var> = mixture
-                    .into_iter()
-                    .zip(&composed.one_hot)
-                    .flat_map(|(values, &one_hot)| [values, one_hot])
-                    .collect();
-                let segments = tape.concat(&parts)?;
-                let segments = tape.reshape(segments, &[windows * u, c + u])?;
-                let mut of_frame = |all: Var| {
-                    if memory.frames == 1 {
-                        return Ok(all);
-                    }
-                    let from = (t - memory.first) * windows * u;
-                    tape.rows(all, from..from + windows * u)
-                };
-                let tokens = of_frame(memory.tokens)?;
-                let projected = memory
-                    .projected
-                    .iter()
-                    .map(|&all| of_frame(all))
-                    .collect::<Result<Vec<_>, _>>()?;
-                transformer.decode(tape, composed.mixture, segments, tokens, &projected)
-            }
+            SessionKind::Transformer(coder) => coder.code(tape, segments, t, mixture),
         }
-    }
-
-    /// Writes the target segments of all windows for the prediction of frame `t + 1`, each token followed by `gap` numbers that
-    /// are left alone.
-    fn write_segments(&self, t: usize, out: &mut [T], gap: usize) {
-        let (u, c) = (self.controller.window, self.controller.channels);
-        for (window, out) in out.chunks_exact_mut(u * (c + gap)).enumerate() {
-            for (j, token) in out.chunks_exact_mut(c + gap).enumerate() {
-                let frame = self.trajectory.frame(self.segment_frame(t, j));
-                token[..c].copy_from_slice(&frame[window * c..(window + 1) * c]);
-            }
-        }
-    }
-
-    /// Codes the target segments for the prediction of frame `t + 1`, and of some frames after it where windows are few.
-    fn remember(
-        &mut self,
-        tape: &mut Tape<'_, T>,
-        transformer: &TransformerController,
-        t: usize,
-    ) -> Result<(), AutogradError> {
-        if let Some(memory) = &self.memory
-            && (memory.first..memory.first + memory.frames).contains(&t)
-        {
-            return Ok(());
-        }
-        let Some(composed) = &self.composed else {
-            return Ok(());
-        };
-        let (u, c) = (self.controller.window, self.controller.channels);
-        let windows = self.trajectory.windows;
-        let left = self.trajectory.frames - 1 - t;
-        let frames = (WINDOWS_AT_ONCE / windows.max(1)).clamp(1, left.max(1));
-        let rows = windows * u;
-        let segments = tape.constant_with(&[frames * rows, c + u], |out| {
-            out.fill(T::zero());
-            let width = rows * (c + u);
-            for (k, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
-                self.write_segments(t + k, out, u);
-            }
-            for (row, token) in out.chunks_exact_mut(c + u).enumerate() {
-                token[c + row % u] = T::one();
-            }
-        });
-        let (tokens, projected) = transformer.encode(tape, composed.target, segments, u)?;
-        self.memory = Some(Memory {
-            first: t,
-            frames,
-            tokens,
-            projected,
-        });
-        Ok(())
     }
 
     /// The values on the tape that later frames need.
-    pub(super) fn keep(&mut self) -> impl Iterator<Item = &mut Var> {
-        self.memory
-            .iter_mut()
-            .flat_map(|memory| std::iter::once(&mut memory.tokens).chain(&mut memory.projected))
+    pub(super) fn keep(&mut self) -> Vec<&mut Var> {
+        match &mut self.kind {
+            SessionKind::FullyConnected(_) => Vec::new(),
+            SessionKind::Transformer(coder) => coder
+                .memory
+                .iter_mut()
+                .flat_map(|memory| std::iter::once(&mut memory.tokens).chain(&mut memory.projected))
+                .collect(),
+        }
     }
 }
