@@ -15,7 +15,8 @@ What is done otherwise:
 Shapes: B windows, N frames, u = 7 tokens, F frames of a chunk; fed frames X_t are [149, B].
 """
 
-from dataclasses import dataclass
+import math
+from functools import partial
 
 import numpy
 import torch
@@ -37,143 +38,82 @@ from layout import (
 from reference import sinusoidal_positions
 
 CONTROLLERS = ("root_trajectory_controller", "velocity_factor_controller")
+PERCEPTRONS = ("state_encoder", "velocity_encoder", "state_decoder", "root_decoder")
 GIVEN = {CONTROLLERS[0]: ROOT_POSITION, CONTROLLERS[1]: VELOCITY_FACTORS}
 HEAD = WIDTH // HEADS
 SCALE = HEAD**-0.5
 AFTER = SEGMENT - BEFORE - 1
+NARROW = 16  # columns
 
 
 class Bits:
-    """Dropout with 16 random bits an element, handed out in order from one buffer; None drops nothing."""
+    """Random bits of a frame, handed out in order; None where nothing is dropped."""
 
-    def __init__(self, bits, dropout):
+    def __init__(self, bits):
         self.bits = bits  # [count], int16
         self.used = 0
-        self.threshold = round(dropout * 65536) - 32768
-        self.scale = 65536 / (32768 - self.threshold)
 
-    def drop(self, x):
+    def take(self, *shape):
         if self.bits is None:
-            return x
-        bits = self.bits[self.used : self.used + x.numel()].view(x.shape)
-        self.used += x.numel()
-        return torch.where(bits >= self.threshold, x * self.scale, 0.0)
+            return None
+        start = self.used
+        self.used += math.prod(shape)
+        return self.bits[start : self.used].view(shape)
+
+
+def drop(x, bits, dropout):
+    """Dropout: an element goes where its 16 bits, read as a signed number, are below the threshold."""
+    if bits is None:
+        return x
+    threshold = round(dropout * 65536) - 32768
+    return torch.where(bits >= threshold, x * (65536 / (32768 - threshold)), 0.0)
+
+
+def product(weight, x):
+    """weight [out, in], x [in, ...] -> [out, ...]."""
+    columns = x.reshape(weight.shape[1], -1)
+    if 1 < columns.shape[1] < NARROW:  # several times faster in MKL the other way round
+        y = (columns.T.contiguous() @ weight.T).T.contiguous()
+    else:
+        y = weight @ columns
+    return y.view(-1, *x.shape[1:])
 
 
 def linear(x, weight, bias):
     """x [in, ...] -> [out, ...]."""
-    y = weight @ x.reshape(x.shape[0], -1)
-    return (y + bias[:, None]).view(-1, *x.shape[1:])
+    return product(weight, x) + bias.view((-1,) + (1,) * (x.dim() - 1))
 
 
 def prelu(x, slope):
     return torch.where(x >= 0, x, slope * x)
 
 
-def layer_norm(x, weight, bias):
-    """Over the features, the first axis."""
-    shape = (-1,) + (1,) * (x.dim() - 1)
-    centred = x - x.mean(0, keepdim=True)
-    scale = (centred.square().mean(0, keepdim=True) + 1e-5).rsqrt()
-    return centred * scale * weight.view(shape) + bias.view(shape)
-
-
-def attention(q, k, v, bits):
-    """Self-attention or cross-attention of 7 queries, all [256, 7, B]."""
+def attention(q, k, v, bits, dropout):
+    """Attention of 7 queries into 7 keys and values, all [256, 7, B]; bits [8, 7, 7, B]."""
     q, k, v = (x.unflatten(0, (HEADS, HEAD)) for x in (q, k, v))  # [8, 32, 7, B]
     scores = (q[:, :, :, None] * k[:, :, None]).sum(1) * SCALE  # [8, 7, 7, B]
-    weights = bits.drop(scores.softmax(2))
+    weights = drop(scores.softmax(2), bits, dropout)
     return (weights[:, None] * v[:, :, None]).sum(3).flatten(0, 1)  # [256, 7, B]
 
 
-def attention_of_one(query, x, p, bits):
-    """Attention of one query [256, B] into x [256, 7, B], output projection included: [256, B].
+def attention_of_one(q, x, bits, dropout):
+    """Attention of one query into x [256, 7, B], values not projected.
 
-    The key bias adds the same to every score, so the softmax does not see it.
+    q [8, 256, B]: the query as the heads' key weights see it, W_k^T q; bits [8, 7, B].
+    Returns what each head sees [8, 256, B] and the sum of its weights [8, 1, B].
     """
-    q_weight, k_weight, v_weight = p["in_proj_weight"].split(WIDTH)
-    q_bias, _, v_bias = p["in_proj_bias"].split(WIDTH)
-    q = linear(query, q_weight, q_bias).unflatten(0, (HEADS, HEAD))  # [8, 32, B]
-    q = torch.bmm(k_weight.unflatten(0, (HEADS, HEAD)).transpose(1, 2), q)  # [8, 256, B]
     scores = (q[:, :, None] * x).sum(1) * SCALE  # [8, 7, B]
-    weights = bits.drop(scores.softmax(1))
-    seen = (weights[:, None] * x).sum(2)  # [8, 256, B]
-    values = torch.bmm(v_weight.unflatten(0, (HEADS, HEAD)), seen)  # [8, 32, B]
-    values = values + v_bias.view(HEADS, HEAD, 1) * weights.sum(1, keepdim=True)
-    return linear(values.flatten(0, 1), p["out_proj.weight"], p["out_proj.bias"])
+    weights = drop(scores.softmax(1), bits, dropout)
+    return (weights[:, None] * x).sum(2), weights.sum(1, keepdim=True)
 
 
-def inside(p, prefix):
-    """The entries of p below `prefix`, the prefix cut off."""
-    return {name[len(prefix) :]: value for name, value in p.items() if name.startswith(prefix)}
-
-
-def add_and_norm(x, y, p, norm, bits):
-    return layer_norm(x + bits.drop(y), p[norm + ".weight"], p[norm + ".bias"])
-
-
-def feed_forward(x, p):
-    return linear(
-        linear(x, p["linear1.weight"], p["linear1.bias"]).relu(), p["linear2.weight"], p["linear2.bias"]
-    )
-
-
-def project_out(x, p):
-    return linear(x, p["out_proj.weight"], p["out_proj.bias"])
-
-
-def encoder_layer(x, q, k, v, p, bits):
-    """x, q, k, v [256, 7, B]: the tokens and their projections -> [256, 7, B]."""
-    seen = project_out(attention(q, k, v, bits), inside(p, "self_attn."))
-    x = add_and_norm(x, seen, p, "norm1", bits)
-    return add_and_norm(x, feed_forward(x, p), p, "norm2", bits)
-
-
-def encode(tokens, constants, p, bits, dropout):
-    """The encoder over the target segments of F frames.
-
-    tokens [F + 6, 1024, B]: embedding, query, key, value of frames t - 2 .. t + F + 3, positions left out;
-    constants [1024, 7]: the part of the positions and biases.
-    Returns the encoder's output, and the keys and values that the first decoder layer makes of it:
-    [256, 7, F, B], [512, 7, F, B].
-    """
-    bits = Bits(bits, dropout)
-    frames = tokens.shape[0] - SEGMENT + 1
-    segments = torch.stack([tokens[i : i + frames] for i in range(SEGMENT)])  # [7, F, 1024, B]
-    segments = segments.permute(2, 0, 1, 3).flatten(2) + constants[:, :, None]  # [1024, 7, FB]
-    x, q, k, v = segments.split(WIDTH)
-    x = encoder_layer(x, q, k, v, inside(p, "encoder.layers.0."), bits)
-    p1 = inside(p, "encoder.layers.1.")
-    q, k, v = linear(x, p1["self_attn.in_proj_weight"], p1["self_attn.in_proj_bias"]).split(WIDTH)
-    memory = encoder_layer(x, q, k, v, p1, bits)
-    cross = "decoder.layers.0.multihead_attn.in_proj_"
-    keys_values = linear(memory, p[cross + "weight"][WIDTH:], p[cross + "bias"][WIDTH:])
-    return memory.unflatten(2, (frames, -1)), keys_values.unflatten(2, (frames, -1))
-
-
-def decode(tokens, memory, keys_values, p, bits):
-    """The decoder at the centre of one segment.
-
-    tokens [1024, 7, B]: embedding, query, key, value; memory [256, 7, B]; keys_values [512, 7, B] -> [256, B].
-    """
-    x, q, k, v = tokens.split(WIDTH)
-    p0 = inside(p, "decoder.layers.0.")
-    cross = inside(p0, "multihead_attn.")
-    seen = project_out(attention(q, k, v, bits), inside(p0, "self_attn."))
-    x = add_and_norm(x, seen, p0, "norm1", bits)
-    q = linear(x, cross["in_proj_weight"][:WIDTH], cross["in_proj_bias"][:WIDTH])
-    seen = project_out(attention(q, *keys_values.split(WIDTH), bits), cross)
-    x = add_and_norm(x, seen, p0, "norm2", bits)
-    x = add_and_norm(x, feed_forward(x, p0), p0, "norm3", bits)
-
-    p1 = inside(p, "decoder.layers.1.")
-    centre = x[:, BEFORE]
-    seen = attention_of_one(centre, x, inside(p1, "self_attn."), bits)
-    centre = add_and_norm(centre, seen, p1, "norm1", bits)
-    seen = attention_of_one(centre, memory, inside(p1, "multihead_attn."), bits)
-    centre = add_and_norm(centre, seen, p1, "norm2", bits)
-    centre = add_and_norm(centre, feed_forward(centre, p1), p1, "norm3", bits)
-    return linear(centre, p["output.weight"], p["output.bias"])
+def add_and_norm(x, y, bias, norm_weight, norm_bias, bits, dropout):
+    """Layer norm over the features of x + dropout(y + bias); x, y, bits [256, ...]."""
+    shape = (-1,) + (1,) * (x.dim() - 1)
+    x = x + drop(y + bias.view(shape), bits, dropout)
+    centred = x - x.mean(0, keepdim=True)
+    scale = (centred.square().mean(0, keepdim=True) + 1e-5).rsqrt()
+    return centred * scale * norm_weight.view(shape) + norm_bias.view(shape)
 
 
 def lstm_cell(gates, cell):
@@ -181,6 +121,105 @@ def lstm_cell(gates, cell):
     i, f, g, o = gates.split(WIDTH)
     cell = f.sigmoid() * cell + i.sigmoid() * g.tanh()
     return o.sigmoid() * cell.tanh(), cell
+
+
+class Layer:
+    """A Transformer layer's parameters, with the dropout bits to run it."""
+
+    def __init__(self, p, bits, dropout):
+        self.p, self.bits, self.dropout = p, bits, dropout
+
+    def attend(self, q, k, v):
+        bits = self.bits.take(HEADS, SEGMENT, SEGMENT, q.shape[-1])
+        return attention(q, k, v, bits, self.dropout)
+
+    def attend_one(self, query, x, part):
+        """One query [256, B] into x [256, 7, B], values projected; the output projection is to do.
+
+        The key bias adds the same to every score, so the softmax does not see it.
+        """
+        p = inside(self.p, part + ".")
+        q = linear(query, p["q_weight"], p["q_bias"]).unflatten(0, (HEADS, HEAD))  # [8, 32, B]
+        q = torch.bmm(p["k_weight"].unflatten(0, (HEADS, HEAD)).transpose(1, 2), q)  # [8, 256, B]
+        bits = self.bits.take(HEADS, SEGMENT, x.shape[-1])
+        seen, total = attention_of_one(q, x, bits, self.dropout)
+        values = torch.bmm(p["v_weight"].unflatten(0, (HEADS, HEAD)), seen)  # [8, 32, B]
+        return (values + p["v_bias"].view(HEADS, HEAD, 1) * total).flatten(0, 1)
+
+    def add_and_norm(self, x, y, name, norm):
+        """The sublayer's last linear map `name` of y, dropout, residual and `norm`."""
+        return add_and_norm(
+            x,
+            product(self.p[name + ".weight"], y),
+            self.p[name + ".bias"],
+            self.p[norm + ".weight"],
+            self.p[norm + ".bias"],
+            self.bits.take(*x.shape),
+            self.dropout,
+        )
+
+    def feed_forward(self, x, norm):
+        hidden = linear(x, self.p["linear1.weight"], self.p["linear1.bias"]).relu()
+        return self.add_and_norm(x, hidden, "linear2", norm)
+
+    def encoder(self, x, q, k, v):
+        """x, q, k, v [256, 7, B]: the tokens and their projections -> [256, 7, B]."""
+        x = self.add_and_norm(x, self.attend(q, k, v), "self_attn.out_proj", "norm1")
+        return self.feed_forward(x, "norm2")
+
+    def decoder(self, x, q, k, v, memory_keys, memory_values):
+        """All [256, 7, B] -> [256, 7, B]."""
+        x = self.add_and_norm(x, self.attend(q, k, v), "self_attn.out_proj", "norm1")
+        q = linear(x, self.p["multihead_attn.q_weight"], self.p["multihead_attn.q_bias"])
+        seen = self.attend(q, memory_keys, memory_values)
+        x = self.add_and_norm(x, seen, "multihead_attn.out_proj", "norm2")
+        return self.feed_forward(x, "norm3")
+
+    def decoder_at_centre(self, x, memory):
+        """x, memory [256, 7, B] -> [256, B]."""
+        centre = x[:, BEFORE]
+        seen = self.attend_one(centre, x, "self_attn")
+        centre = self.add_and_norm(centre, seen, "self_attn.out_proj", "norm1")
+        seen = self.attend_one(centre, memory, "multihead_attn")
+        centre = self.add_and_norm(centre, seen, "multihead_attn.out_proj", "norm2")
+        return self.feed_forward(centre, "norm3")
+
+
+def inside(p, prefix):
+    """The entries of p below `prefix`, the prefix cut off."""
+    return {name[len(prefix) :]: value for name, value in p.items() if name.startswith(prefix)}
+
+
+def encode(tokens, constants, p, bits, dropout):
+    """The encoder over the target segments of F frames.
+
+    tokens (F + 6) x [1024, B]: embedding, query, key, value of frames t - 2 .. t + F + 3, positions left out;
+    constants [1024, 7]: the part of the positions and biases.
+    Returns the encoder's output, and the keys and values that the first decoder layer makes of it:
+    [256, 7, F, B], [512, 7, F, B].
+    """
+    bits = Bits(bits)
+    frames = len(tokens) - SEGMENT + 1
+    segments = torch.stack([tokens[i + f] for i in range(SEGMENT) for f in range(frames)], 1)
+    segments = segments.view(4 * WIDTH, SEGMENT, -1) + constants[:, :, None]  # [1024, 7, FB]
+    x = Layer(p["encoder.0"], bits, dropout).encoder(*segments.split(WIDTH))
+    p1 = p["encoder.1"]
+    q, k, v = linear(x, p1["self_attn.in_proj_weight"], p1["self_attn.in_proj_bias"]).split(WIDTH)
+    memory = Layer(p1, bits, dropout).encoder(x, q, k, v)
+    cross = p["decoder.0"]
+    keys_values = linear(memory, cross["multihead_attn.kv_weight"], cross["multihead_attn.kv_bias"])
+    return memory.unflatten(2, (frames, -1)), keys_values.unflatten(2, (frames, -1))
+
+
+def decode(tokens, memory, keys_values, p, bits, dropout):
+    """The decoder at the centre of one segment.
+
+    tokens [1024, 7, B]: embedding, query, key, value; memory [256, 7, B]; keys_values [512, 7, B] -> [256, B].
+    """
+    layer = Layer(p["decoder.0"], bits, dropout)
+    x = layer.decoder(*tokens.split(WIDTH), *keys_values.split(WIDTH))
+    centre = Layer(p["decoder.1"], bits, dropout).decoder_at_centre(x, memory)
+    return linear(centre, p["output"]["weight"], p["output"]["bias"])
 
 
 def perceptron(x, p, last=None):
@@ -207,21 +246,21 @@ def frame_step(fed, history, given, constants, memories, state, given_gates, p, 
     LSTMs, [256, B]; given_gates [1024, B]: what lstm2's gates get from target, position and biases.
     Returns the frame [149, B] and the new state.
     """
-    bits = Bits(bits, dropout)
+    bits = Bits(bits)
     codes = [
-        perceptron(fed[STATE], inside(p, "state_encoder.")),
-        perceptron(fed[VELOCITIES], inside(p, "velocity_encoder.")),
+        perceptron(fed[STATE], p["state_encoder"]),
+        perceptron(fed[VELOCITIES], p["velocity_encoder"]),
     ]
     for i, name in enumerate(CONTROLLERS):
         tokens = torch.stack([*history[i], *given[i]], 1) + constants[i][:, :, None]  # [1024, 7, B]
-        codes.append(decode(tokens, *memories[i], inside(p, name + "."), bits))
+        codes.append(decode(tokens, *memories[i], p[name], bits, dropout))
     hidden1, cell1, hidden2, cell2 = state
     gates = linear(torch.cat([*codes, hidden1]), p["lstm1"], p["lstm1_bias"])
     hidden1, cell1 = lstm_cell(gates, cell1)
     gates = p["lstm2"] @ torch.cat([hidden1, hidden2]) + given_gates
     hidden2, cell2 = lstm_cell(gates, cell2)
-    pose = perceptron(hidden2, inside(p, "state_decoder."), "4")  # [142, B]
-    root = perceptron(hidden2, inside(p, "root_decoder."), "4")  # [7, B]
+    pose = perceptron(hidden2, p["state_decoder"], "4")  # [142, B]
+    root = perceptron(hidden2, p["root_decoder"], "4")  # [7, B]
     frame = torch.cat([pose[:69], root[:4], pose[69:], root[4:]])
     return frame, (hidden1, cell1, hidden2, cell2)
 
@@ -235,17 +274,13 @@ def dropout_counts(windows):
     return windows * encoder, windows * 2 * decoder
 
 
-@dataclass
-class Compiled:
-    """The functions that a frame runs, compiled or as they are."""
+class Functions:
+    """What runs once a frame, as it is or compiled; each new shape is compiled anew."""
 
-    encode: callable = encode
-    frame_step: callable = frame_step
-    fed_tokens: callable = fed_tokens
-
-
-def compiled():
-    return Compiled(*(torch.compile(f, dynamic=False) for f in (encode, frame_step, fed_tokens)))
+    def __init__(self, fuse=False):
+        torch._dynamo.config.recompile_limit = 64
+        wrap = partial(torch.compile, dynamic=False) if fuse else lambda function: function
+        self.encode, self.frame_step, self.fed_tokens = map(wrap, (encode, frame_step, fed_tokens))
 
 
 class Optimised:
@@ -256,7 +291,7 @@ class Optimised:
         self.parameters = dict(model.named_parameters())
         self.statistics = model.statistics
         self.dropout = dropout
-        self.functions = functions or Compiled()
+        self.functions = functions or Functions()
         self.chunk = chunk
         self.generator = numpy.random.Generator(numpy.random.SFC64(seed))
         std, mean = model.statistics.std[:, None], model.statistics.mean[:, None]
@@ -279,22 +314,31 @@ class Optimised:
         window = window.transpose(1, 2).contiguous()  # [N + 1, 154, B]
         last, windows = window.shape[0] - 1, window.shape[2]
         p = self.parameters
+        weights = {name: inside(p, name + ".") for name in PERCEPTRONS}
+        weights |= {name: controller_parameters(inside(p, name + ".")) for name in CONTROLLERS}
 
         memories, given, composed, constants = [], [], [], []
         for name in CONTROLLERS:
             part = inside(p, name + ".")
             values = pad(window[:, GIVEN[name]])  # [N + 6, in, B]
-            weight, constant = compose(part, "target_projection.", "encoder.layers.0.self_attn.in_proj_")
-            memories.append(self.encode(torch.matmul(weight, values), constant, part))
-            weight, constant = compose(part, "mixture_projection.", "decoder.layers.0.self_attn.in_proj_")
+            weight, constant = compose(
+                part, "target_projection.", "encoder.layers.0.self_attn.in_proj_"
+            )
+            memories.append(
+                self.encode(torch.matmul(weight, values).unbind(), constant, weights[name])
+            )
+            weight, constant = compose(
+                part, "mixture_projection.", "decoder.layers.0.self_attn.in_proj_"
+            )
             composed.append(weight)
             constants.append(constant)
             given.append(torch.matmul(weight, values).unbind())  # [1024, B] a frame
         given_gates = self.given_gates(window)
-        weights = {k: v for k, v in p.items() if k.startswith(FRAME_STEP_PARAMETERS)}
         weights["lstm1"] = torch.cat([p["lstm1.weight_ih_l0"], p["lstm1.weight_hh_l0"]], 1)
         weights["lstm1_bias"] = p["lstm1.bias_ih_l0"] + p["lstm1.bias_hh_l0"]
-        weights["lstm2"] = torch.cat([p["lstm2.weight_ih_l0"][:, :WIDTH], p["lstm2.weight_hh_l0"]], 1)
+        weights["lstm2"] = torch.cat(
+            [p["lstm2.weight_ih_l0"][:, :WIDTH], p["lstm2.weight_hh_l0"]], 1
+        )
 
         state = tuple(window.new_zeros(WIDTH, windows) for _ in range(4))
         fed = window[0, :OUTPUTS]
@@ -322,9 +366,8 @@ class Optimised:
         return torch.stack(outputs).transpose(1, 2)
 
     def encode(self, tokens, constant, part):
-        """tokens [N + 6, 1024, B] -> memory and keys and values of each of the N frames."""
-        part = {k: v for k, v in part.items() if k.startswith(ENCODE_PARAMETERS)}
-        frames, windows = tokens.shape[0] - SEGMENT + 1, tokens.shape[2]
+        """tokens (N + 6) x [1024, B] -> memory and keys and values of each of the N frames."""
+        frames, windows = len(tokens) - SEGMENT + 1, tokens[0].shape[1]
         chunk = self.chunk or frames
         memories = []
         for start in range(0, frames, chunk):
@@ -353,18 +396,33 @@ class Optimised:
         position = prelu(position, p["position_encoder.1.weight"])
         weight = p["lstm2.weight_ih_l0"]
         bias = p["lstm2.bias_ih_l0"] + p["lstm2.bias_hh_l0"]
-        gates = linear(position, weight, bias) + (weight[:, WIDTH:] @ target)[:, None]  # [1024, N, B]
+        gates = (
+            linear(position, weight, bias) + (weight[:, WIDTH:] @ target)[:, None]
+        )  # [1024, N, B]
         return gates.transpose(0, 1).contiguous().unbind()
 
 
-FRAME_STEP_PARAMETERS = (
-    "state_encoder.",
-    "velocity_encoder.",
-    "state_decoder.",
-    "root_decoder.",
-    *(name + part for name in CONTROLLERS for part in (".decoder.", ".output.")),
-)
-ENCODE_PARAMETERS = ("encoder.", "decoder.layers.0.multihead_attn.in_proj_")
+def controller_parameters(p):
+    """A controller's parameters, a dictionary a layer, with the attention's projections cut apart.
+
+    Cut once for all frames: the gradient of a slice fills the whole with zeros first.
+    """
+    layers = {"output": inside(p, "output.")}
+    for stack in ("encoder", "decoder"):
+        for i in (0, 1):
+            layers[f"{stack}.{i}"] = inside(p, f"{stack}.layers.{i}.")
+    cut_attention(layers["decoder.0"], "multihead_attn", {"q": 1, "kv": 2})
+    cut_attention(layers["decoder.1"], "self_attn", {"q": 1, "k": 1, "v": 1})
+    cut_attention(layers["decoder.1"], "multihead_attn", {"q": 1, "k": 1, "v": 1})
+    return layers
+
+
+def cut_attention(p, part, names):
+    """Adds the pieces of in_proj_weight and in_proj_bias by their names, each so many times 256 rows."""
+    sizes = [WIDTH * count for count in names.values()]
+    for kind in ("weight", "bias"):
+        pieces = p[f"{part}.in_proj_{kind}"].split(sizes)
+        p |= {f"{part}.{name}_{kind}": piece for name, piece in zip(names, pieces)}
 
 
 def velocity_order_weights(dtype):

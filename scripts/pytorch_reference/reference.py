@@ -24,14 +24,16 @@ from layout import (
 
 
 def encoder(inputs):
-    return nn.Sequential(
-        nn.Linear(inputs, 512), nn.PReLU(), nn.Linear(512, WIDTH), nn.PReLU()
-    )
+    return nn.Sequential(nn.Linear(inputs, 512), nn.PReLU(), nn.Linear(512, WIDTH), nn.PReLU())
 
 
 def decoder(outputs):
     return nn.Sequential(
-        nn.Linear(WIDTH, 512), nn.PReLU(), nn.Linear(512, WIDTH), nn.PReLU(), nn.Linear(WIDTH, outputs)
+        nn.Linear(WIDTH, 512),
+        nn.PReLU(),
+        nn.Linear(512, WIDTH),
+        nn.PReLU(),
+        nn.Linear(WIDTH, outputs),
     )
 
 
@@ -54,7 +56,9 @@ class Controller(nn.Module):
         self.target_projection = nn.Linear(inputs, WIDTH)
         self.mixture_projection = nn.Linear(inputs, WIDTH)
         self.encoder = nn.TransformerEncoder(
-            nn.TransformerEncoderLayer(WIDTH, HEADS, WIDTH, **options), 2, enable_nested_tensor=False
+            nn.TransformerEncoderLayer(WIDTH, HEADS, WIDTH, **options),
+            2,
+            enable_nested_tensor=False,
         )
         self.decoder = nn.TransformerDecoder(
             nn.TransformerDecoderLayer(WIDTH, HEADS, WIDTH, **options), 2
@@ -130,8 +134,6 @@ class Pan2021(nn.Module):
             pose = self.state_decoder(hidden[0])  # [B, 142]
             root = self.root_decoder(hidden[0])  # [B, 7]
             outputs.append(
-                torch.cat(
-                    [pose[:, :69], root[:, :4], pose[:, 69:73], pose[:, 73:], root[:, 4:]], 1
-                )
+                torch.cat([pose[:, :69], root[:, :4], pose[:, 69:73], pose[:, 73:], root[:, 4:]], 1)
             )
         return torch.stack(outputs)

@@ -8,7 +8,6 @@ from layout import (
     CONTACTS,
     FEATURES,
     JOINTS,
-    OUTPUTS,
     PARENTS,
     VELOCITIES,
     VELOCITY_FACTORS,
@@ -29,7 +28,9 @@ def raw_windows(frames, windows, generator):
         t = torch.arange(frames + 2, dtype=torch.float64)[:, None, None]
         waves = [
             draw(windows, numbers)
-            * torch.sin(t * (0.05 + 0.15 * draw(windows, numbers).abs()) + 3 * draw(windows, numbers))
+            * torch.sin(
+                t * (0.05 + 0.15 * draw(windows, numbers).abs()) + 3 * draw(windows, numbers)
+            )
             for _ in range(3)
         ]
         return size * sum(waves)
