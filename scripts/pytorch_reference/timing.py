@@ -76,7 +76,7 @@ def in_turn(runs, rounds):
 def report(title, unit, best):
     print(f"\n{title}, {unit}")
     for name, speed in best.items():
-        print(f"  {name:<34} {speed:10.1f}")
+        print(f"  {name:<34} {speed:10.1f}", flush=True)
     if "keydance" in best:
         others = {n: s for n, s in best.items() if n.startswith("optimised")}
         name = max(others, key=others.get)

@@ -64,12 +64,12 @@ class Shards:
         self.barrier = context.Barrier(workers + 1)
         self.queues = [context.SimpleQueue() for _ in range(workers)]
         count = sum(p.numel() for p in make(0)[0].parameters())
-        weights = torch.zeros(count).share_memory_()
+        self.weights = torch.zeros(count).share_memory_()
         gradients = torch.zeros(workers, count).share_memory_()
         self.processes = [
             context.Process(
                 target=work,
-                args=(rank, make, weights, gradients, self.queues[rank], self.barrier),
+                args=(rank, make, self.weights, gradients, self.queues[rank], self.barrier),
                 daemon=True,
             )
             for rank in range(workers)
