@@ -5,6 +5,7 @@ mod bench_step;
 mod bvh;
 mod evaluate;
 mod evaluation_record;
+mod export_batch;
 mod features;
 mod gradcheck;
 mod progress;
@@ -38,6 +39,8 @@ enum Command {
     BenchStep(bench_step::BenchStepArgs),
     /// Look into BVH files
     Bvh(bvh::BvhArgs),
+    /// Write a batch with a trained model's outputs, losses and gradients
+    ExportBatch(export_batch::ExportBatchArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
     /// Compare the gradient of a model's whole loss with central differences
@@ -60,6 +63,7 @@ impl Cli {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
             Command::BenchStep(args) => bench_step::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
+            Command::ExportBatch(args) => export_batch::run(args)?,
             Command::Features(args) => features::run(args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::Train(args) => return train::run(args),

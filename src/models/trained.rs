@@ -36,6 +36,10 @@ impl TrainedModel {
         }
     }
 
+    pub fn network(&self) -> &dyn Network<f32> {
+        &*self.network
+    }
+
     pub fn parameters(&self) -> &Parameters<f32> {
         &self.parameters
     }
