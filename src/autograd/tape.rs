@@ -43,6 +43,15 @@ struct Node<T> {
     operation: Option<Box<dyn Operation<T>>>,
 }
 
+/// The lists of a tape, which outlive it empty in its workspace.
+#[derive(Default)]
+pub(super) struct Lists<T: Real> {
+    nodes: Vec<Node<T>>,
+    leaves: Vec<Option<Var>>,
+    slots: Vec<Option<Vec<T>>>,
+    stagings: Vec<Option<Staging<T>>>,
+}
+
 /// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape ends or
 /// [`Tape::forget_since`].
 pub struct Tape<'a, T: Real> {
@@ -58,11 +67,15 @@ pub struct Tape<'a, T: Real> {
 impl<'a, T: Real> Tape<'a, T> {
     /// A tape that records, to be run backwards.
     pub fn recording(parameters: &'a Parameters<T>, workspace: &'a mut Workspace<T>) -> Self {
+        let lists = workspace.lists();
+        let nodes = std::mem::take(&mut lists.nodes);
+        let mut leaves = std::mem::take(&mut lists.leaves);
+        leaves.resize(parameters.blocks(), None);
         Self {
-            leaves: vec![None; parameters.blocks()],
+            leaves,
             parameters,
             workspace,
-            nodes: Vec::new(),
+            nodes,
             recording: true,
             dropout_key: None,
             trace: false,
@@ -87,7 +100,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.dropout_key = key;
     }
 
-    /// Makes [`Tape::backward`] look for the first gradient that is not finite (slow: for finding the cause).
+    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs that is not finite (slow: for
+    /// finding the cause).
     pub fn with_trace(mut self) -> Self {
         self.trace = true;
         self
@@ -335,9 +349,10 @@ impl<'a, T: Real> Tape<'a, T> {
         inputs: &[Var],
         gradients: &mut Gradients<T>,
     ) -> Result<Vec<ArrayD<T>>, AutogradError> {
-        let mut slots: Vec<Option<Vec<T>>> = Vec::new();
+        let lists = self.workspace.lists();
+        let mut slots = std::mem::take(&mut lists.slots);
         slots.resize_with(self.nodes.len(), || None);
-        let mut stagings: Vec<Option<Staging<T>>> = Vec::new();
+        let mut stagings = std::mem::take(&mut lists.stagings);
         stagings.resize_with(self.nodes.len(), || None);
         if self.needs_gradient(output) {
             let mut seed = self.workspace.take(upstream.len());
@@ -374,6 +389,14 @@ impl<'a, T: Real> Tape<'a, T> {
                         output: Var(index as u32),
                     };
                     operation.backward(&mut dy, &mut context);
+                    if self.trace
+                        && let Some(what) = self.nodes[index]
+                            .inputs
+                            .iter()
+                            .find_map(|input| slots[input.index()].as_deref().and_then(not_finite))
+                    {
+                        return Err(self.non_finite(index, what, "gradient"));
+                    }
                     self.workspace.give(dy);
                 }
                 operation.release(self.workspace);
@@ -395,6 +418,12 @@ impl<'a, T: Real> Tape<'a, T> {
                 self.workspace.give(array.into_raw_vec_and_offset().0);
             }
         }
+        for unclaimed in slots.drain(..).flatten() {
+            self.workspace.give(unclaimed);
+        }
+        stagings.clear();
+        let lists = self.workspace.lists();
+        (lists.slots, lists.stagings) = (slots, stagings);
         found.sort_by_key(|(k, _)| *k);
         Ok(found.into_iter().map(|(_, gradient)| gradient).collect())
     }
@@ -402,9 +431,13 @@ impl<'a, T: Real> Tape<'a, T> {
 
 impl<T: Real> Drop for Tape<'_, T> {
     fn drop(&mut self) {
-        for node in &mut self.nodes {
-            release(node, self.workspace);
+        for mut node in self.nodes.drain(..) {
+            release(&mut node, self.workspace);
         }
+        self.leaves.clear();
+        let lists = self.workspace.lists();
+        lists.nodes = std::mem::take(&mut self.nodes);
+        lists.leaves = std::mem::take(&mut self.leaves);
     }
 }
 

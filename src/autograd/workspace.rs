@@ -1,15 +1,26 @@
 //! Buffers that one step leaves behind for the next.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use super::kernels::Real;
+use super::tape::Lists;
 
 /// A pool of buffers by size class, so that after the first steps a training step allocates nothing large.
 ///
 /// A class spans an eighth of a power of two, so that a reused buffer is at most that much longer than asked for.
-#[derive(Debug, Default)]
-pub struct Workspace<T> {
+#[derive(Default)]
+pub struct Workspace<T: Real> {
     free: BTreeMap<usize, Vec<Vec<T>>>,
+    lists: Lists<T>,
+}
+
+impl<T: Real> fmt::Debug for Workspace<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Workspace")
+            .field("held", &self.held())
+            .finish_non_exhaustive()
+    }
 }
 
 /// Capacity of the class that holds `len` numbers.
@@ -23,9 +34,7 @@ fn class(len: usize) -> usize {
 
 impl<T: Real> Workspace<T> {
     pub fn new() -> Self {
-        Self {
-            free: BTreeMap::new(),
-        }
+        Self::default()
     }
 
     /// A buffer of `len` numbers, whose content is whatever an earlier step left there.
@@ -57,6 +66,11 @@ impl<T: Real> Workspace<T> {
         if capacity > 0 && class(capacity) == capacity {
             self.free.entry(capacity).or_default().push(buffer);
         }
+    }
+
+    /// Where a tape finds its lists and leaves them.
+    pub(super) fn lists(&mut self) -> &mut Lists<T> {
+        &mut self.lists
     }
 
     /// Numbers held by the free buffers.

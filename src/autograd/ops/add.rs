@@ -18,7 +18,7 @@ impl<T: Real> Operation<T> for Add {
         for operand in [self.a, self.b] {
             let shape = context.shape(operand);
             if let Some(target) = context.target(operand) {
-                add_reduced(target, shape, &self.shape, dy.to_vec());
+                add_reduced(target, shape, &self.shape, dy.iter().copied());
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Shapes that broadcast as numpy's do, for the elementwise operations of two operands.
 
-use ndarray::{ArrayD, ArrayViewD, Axis, IxDyn, Zip};
+use ndarray::{ArrayViewD, IxDyn, Zip};
 
 use super::shapes_error;
 use crate::autograd::error::AutogradError;
@@ -66,30 +66,49 @@ pub(super) fn zip_into<T: Real>(
         .for_each(|o, &x, &y| *o = f(x, y));
 }
 
-/// Adds a gradient of the output's shape to that of an operand, summed over the axes along which the operand was broadcast.
+/// Adds a gradient of the output's shape, its numbers in row-major order, to that of an operand, summed over the axes along which
+/// the operand was broadcast.
 pub(super) fn add_reduced<T: Real>(
     target: Target<'_, T>,
     operand: &[usize],
     shape: &[usize],
-    gradient: Vec<T>,
+    gradient: impl Iterator<Item = T>,
 ) {
+    let data = target.data;
+    if target.fresh {
+        data.fill(T::zero());
+    }
     if operand == shape {
-        target.add(|i| gradient[i]);
+        data.iter_mut().zip(gradient).for_each(|(d, g)| *d += g);
         return;
     }
-    let Ok(mut sum) = ArrayD::from_shape_vec(IxDyn(shape), gradient) else {
-        return;
-    };
-    while sum.ndim() > operand.len() {
-        sum = sum.sum_axis(Axis(0));
-    }
-    for (axis, &size) in operand.iter().enumerate() {
-        if size == 1 && sum.shape()[axis] != 1 {
-            sum = sum.sum_axis(Axis(axis)).insert_axis(Axis(axis));
+    let strides = broadcast_strides(operand, shape);
+    let mut index = vec![0; shape.len()];
+    let mut place = 0;
+    for g in gradient {
+        data[place] += g;
+        // On to the next number of the output, the last axis running fastest.
+        for axis in (0..shape.len()).rev() {
+            index[axis] += 1;
+            place += strides[axis];
+            if index[axis] < shape[axis] {
+                break;
+            }
+            index[axis] = 0;
+            place -= strides[axis] * shape[axis];
         }
     }
-    let sum = sum.as_standard_layout().into_owned();
-    if let Some(values) = sum.as_slice() {
-        target.add(|i| values[i]);
+}
+
+/// How far apart in an operand neighbours along each axis of `shape` lie: 0 where the operand was broadcast.
+fn broadcast_strides(operand: &[usize], shape: &[usize]) -> Vec<usize> {
+    let mut strides = vec![0; shape.len()];
+    let mut stride = 1;
+    for (strides, &size) in strides.iter_mut().rev().zip(operand.iter().rev()) {
+        if size != 1 {
+            *strides = stride;
+        }
+        stride *= size;
     }
+    strides
 }

@@ -18,13 +18,11 @@ impl<T: Real> Operation<T> for Mul {
         for (operand, other) in [(self.a, self.b), (self.b, self.a)] {
             let shape = context.shape(operand);
             let factor = context.array(other);
+            let Some(factor) = factor.broadcast(self.shape.as_slice()) else {
+                continue;
+            };
             if let Some(target) = context.target(operand) {
-                let mut gradient = dy.to_vec();
-                if let Some(factor) = factor.broadcast(self.shape.as_slice()) {
-                    for (d, &x) in gradient.iter_mut().zip(factor.iter()) {
-                        *d *= x;
-                    }
-                }
+                let gradient = dy.iter().zip(factor).map(|(&d, &x)| d * x);
                 add_reduced(target, shape, &self.shape, gradient);
             }
         }

@@ -18,7 +18,7 @@ impl<T: Real> Operation<T> for Sub {
         for (operand, sign) in [(self.a, T::one()), (self.b, -T::one())] {
             let shape = context.shape(operand);
             if let Some(target) = context.target(operand) {
-                let gradient = dy.iter().map(|&d| d * sign).collect();
+                let gradient = dy.iter().map(|&d| d * sign);
                 add_reduced(target, shape, &self.shape, gradient);
             }
         }

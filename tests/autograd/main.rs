@@ -1,0 +1,7 @@
+//! The engine through its public interface.
+
+mod errors;
+mod extremes;
+mod fused;
+mod tape;
+mod weights;
