@@ -3,6 +3,7 @@
 mod bench_generate;
 mod bench_step;
 mod bvh;
+mod demo;
 mod evaluate;
 mod evaluation_record;
 mod features;
@@ -36,6 +37,7 @@ enum Command {
     BenchGenerate(bench_generate::BenchGenerateArgs),
     /// Time a training step
     BenchStep(bench_step::BenchStepArgs),
+    Demo(demo::DemoArgs),
     /// Look into BVH files
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
@@ -59,6 +61,7 @@ impl Cli {
         match self.command {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
             Command::BenchStep(args) => bench_step::run(args)?,
+            Command::Demo(args) => return demo::run(args),
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
