@@ -10,6 +10,7 @@
 //! - [`models`] - what fills the frames between two keyframes, behind one trait.
 //! - [`training`] - curriculum, scheduled sampling, losses, the loop, checkpoints.
 //! - [`evaluation`] - LRP, AVF and ART by the paper's protocol, and its tables.
+//! - [`synthesis`] - predicted frames become motion that can be played.
 //! - [`report`] - figures of losses, scores and dancers.
 //! - [`cli`] - the subcommands of the binary.
 #![deny(unsafe_code)]
@@ -23,4 +24,5 @@ pub mod motion;
 pub mod nn;
 pub mod optim;
 pub mod report;
+pub mod synthesis;
 pub mod training;

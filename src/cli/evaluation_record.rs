@@ -46,6 +46,9 @@ pub struct EvaluationRecord {
 }
 
 impl EvaluationRecord {
+    /// Names of the files.
+    pub const FILES: [&str; 2] = [SCORES, DATA];
+
     /// Writes both files into a folder that exists.
     ///
     /// # Errors

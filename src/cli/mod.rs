@@ -3,6 +3,7 @@
 mod bench_generate;
 mod bench_step;
 mod bvh;
+mod demo;
 mod evaluate;
 mod evaluation_record;
 mod export_batch;
@@ -37,6 +38,7 @@ enum Command {
     BenchGenerate(bench_generate::BenchGenerateArgs),
     /// Time a training step
     BenchStep(bench_step::BenchStepArgs),
+    Demo(demo::DemoArgs),
     /// Look into BVH files
     Bvh(bvh::BvhArgs),
     /// Write a batch with a trained model's outputs, losses and gradients
@@ -62,6 +64,7 @@ impl Cli {
         match self.command {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
             Command::BenchStep(args) => bench_step::run(args)?,
+            Command::Demo(args) => return demo::run(args),
             Command::Bvh(args) => bvh::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
             Command::Features(args) => features::run(args)?,

@@ -147,7 +147,8 @@ pub(super) fn set_aside(path: &Path) -> Result<(), FileError> {
     durable::rename(path, &aside)
 }
 
-fn remove(folder: &Path) -> Result<(), FileError> {
+/// Removes a folder and what it holds, where it exists.
+pub(super) fn remove(folder: &Path) -> Result<(), FileError> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
             Err(FileError::at(folder, "removed")(error))

@@ -54,6 +54,26 @@ impl RunFolder {
         Ok(run)
     }
 
+    /// A folder for a new run, in place of an earlier run of the same name.
+    ///
+    /// # Errors
+    /// The folder holds a run of another name, or cannot be written.
+    pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+        let run = Self::open(path);
+        if run.config_path().exists() && run.config()?.name == config.name {
+            checkpoint::remove(&run.checkpoints())?;
+            for file in [MANIFEST, LOG, WEIGHTS_FILE, CONFIG].map(|name| path.join(name)) {
+                match fs::remove_file(&file) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(FileError::at(&file, "removed")(error).into());
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Self::create(path, config)
+    }
+
     /// The folder of a run that goes on; a new run where it has not begun.
     ///
     /// # Errors
