@@ -86,6 +86,30 @@ fn a_folder_is_split_and_its_digest_depends_on_names_and_bytes_only() {
 }
 
 #[test]
+fn clips_in_memory_are_split_like_files_and_digested_by_their_poses() {
+    let clip = |name: &str, step: f64| {
+        turning_clip(name, 20, move |frame| {
+            (DVec3::new(step * frame as f64, 90.0, 0.0), 0.0)
+        })
+    };
+    let clips = |step: f64| vec![clip("c", step), clip("a", 1.0), clip("b", 1.0)];
+    let config = config(Split::Share(0.7));
+    let of = |clips| Dataset::from_clips(clips, &config);
+    let dataset = of(clips(1.0)).unwrap();
+    assert_eq!(
+        (names(&dataset.train), names(&dataset.test)),
+        (vec!["a", "b"], vec!["c"])
+    );
+    assert_eq!(dataset.test[0].features.dim(), (20, 154));
+    let mut reversed = clips(1.0);
+    reversed.reverse();
+    assert_eq!(of(reversed).unwrap(), dataset);
+    assert_ne!(of(clips(1.5)).unwrap().digest, dataset.digest);
+    let twice = vec![clip("a", 1.0), clip("b", 1.0), clip("a", 2.0)];
+    assert!(of(twice).unwrap_err().to_string().contains("called a;"));
+}
+
+#[test]
 fn a_folder_that_is_no_data_set_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let message = |split: Split| {
