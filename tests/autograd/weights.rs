@@ -132,11 +132,11 @@ fn gradients_of_several_tapes_add_up() {
     let (_, block) = parameters.add("weight", numbers(3, 4, 0.9));
     let x = numbers(5, 4, 0.1);
     let mut workspace = Workspace::new();
-    let mut gradient_of = |shards: &[std::ops::Range<usize>]| {
+    let mut gradient_of = |cuts: &[usize]| {
         let mut gradients = Gradients::zeros(&parameters);
-        for shard in shards {
+        for ends in cuts.windows(2) {
             let mut tape = Tape::recording(&parameters, &mut workspace);
-            let part = x.slice_axis(ndarray::Axis(0), shard.clone().into());
+            let part = x.slice_axis(ndarray::Axis(0), (ends[0]..ends[1]).into());
             let part = tape.constant(part.to_owned());
             let weight = tape.block(block);
             let y = tape.linear(part, weight, None, false).unwrap();
@@ -146,8 +146,8 @@ fn gradients_of_several_tapes_add_up() {
         }
         gradients.iter().flatten().copied().collect::<Vec<f64>>()
     };
-    let whole = gradient_of(&[0..5]);
-    let added = gradient_of(&[0..1, 1..3, 3..5]);
+    let whole = gradient_of(&[0, 5]);
+    let added = gradient_of(&[0, 1, 3, 5]);
     for (a, b) in added.iter().zip(&whole) {
         assert!((a - b).abs() < 1e-14, "{a} {b}");
     }
