@@ -40,14 +40,14 @@ const CHOREOGRAPHY: &str = "choreography.toml";
 
 /// Generates dance clips, trains a small model on them, evaluates it beside interpolation and writes tables and figures.
 ///
-/// Needs no data, takes about three minutes on two cores and gives the same numbers each time. Ends with exit code 4 if the
+/// Needs no data, takes two to three minutes on two cores and gives the same numbers each time. Ends with exit code 4 if the
 /// model is not ahead of interpolation in LRP at 100 and 150 frames.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Folder for the results; those of an earlier demo there are replaced
     #[arg(long, value_name = "DIR", default_value = "results/demo")]
     out: PathBuf,
-    /// Fewer and shorter clips and about a sixth of the training: half a minute, the same files and the same demand on the model
+    /// Fewer and shorter clips and about a seventh of the training: about 20 seconds, the same files and the same demand on the model
     #[arg(long)]
     reduced: bool,
     /// Share of the demo's schedule that is trained, above 0 and at most 1, instead of the one in experiments/demo.toml

@@ -15,7 +15,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The demo's settings; `reduced` to about a sixth, and `fraction` in place of the schedule's own.
+    /// The demo's settings; `reduced` to about a seventh of the training, and `fraction` in place of the schedule's own.
     ///
     /// # Errors
     /// The fraction is not a share.
@@ -29,6 +29,7 @@ impl Settings {
         };
         if reduced {
             (choreography.clips, choreography.frames_per_clip) = (12, 450);
+            experiment.schedule.fraction = 0.1;
         }
         if let Some(fraction) = fraction {
             experiment.schedule.fraction = fraction;
