@@ -41,7 +41,7 @@ pub(super) fn split(
             let clips = DANCE_TRAIN.0 + DANCE_TEST.0;
             if names.len() != clips {
                 let found = format!(
-                    "holds {}; for other data set data.split = {{ share = 0.8 }}",
+                    "holds {}; for other data, set data.split = {{ share = 0.8 }}",
                     names.len()
                 );
                 return Err(misfit(
@@ -142,7 +142,7 @@ pub(super) fn check_dance_frames(
             ),
             origin: origin.into(),
             found: format!(
-                "gives {} and {}; for other data set data.split = {{ share = 0.8 }}",
+                "gives {} and {}; for other data, set data.split = {{ share = 0.8 }}",
                 found.0, found.1
             ),
         });
