@@ -25,19 +25,10 @@ impl Progress {
     /// `before`: frames that earlier processes predicted of the schedule's.
     pub fn new(schedule: &Schedule, before: u64) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template(
-                "{wide_bar} {percent:>3} %  {msg}  {per_sec}  {eta} left",
-            )
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let frames_per_second =
-                |state: &indicatif::ProgressState, w: &mut dyn std::fmt::Write| {
-                    // A terminal that takes no text shows none.
-                    let _ = write!(w, "{:.0} frames/s", state.per_sec());
-                };
-            let bar = ProgressBar::new(schedule.frame_steps())
-                .with_style(style.with_key("per_sec", frames_per_second));
+            let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            let bar = ProgressBar::new(schedule.frame_steps()).with_style(style);
             bar.set_position(before);
-            bar.reset_eta();
             bar
         });
         Self {
@@ -52,9 +43,17 @@ impl Progress {
 
     /// Shows a step that is done.
     pub fn step(&mut self, report: &StepReport) {
+        // Of this process alone: what an earlier one did took none of its time.
+        let done = (report.frame_steps - self.before) as f64;
+        let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
+        let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
         let what = format!(
-            "step {}/{}  N {}  loss {:.4}",
-            report.step, self.steps, report.length, report.total
+            "step {}/{}  N {}  loss {:.4}  {rate:.0} frames/s  {} left",
+            report.step,
+            self.steps,
+            report.length,
+            report.total,
+            HumanDuration(Duration::from_secs(left as u64))
         );
         if let Some(bar) = &self.bar {
             bar.set_message(what);
@@ -63,13 +62,7 @@ impl Progress {
         }
         if self.line.is_none_or(|last| last.elapsed() >= LINE_EVERY) || report.step == self.steps {
             self.line = Some(Instant::now());
-            let done = (report.frame_steps - self.before) as f64;
-            let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
-            let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
-            eprintln!(
-                "{what}  {rate:.0} frames/s  {} left",
-                HumanDuration(Duration::from_secs(left as u64))
-            );
+            eprintln!("{what}");
         }
     }
 
