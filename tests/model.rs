@@ -348,14 +348,19 @@ fn gradients_are_right(config: &Pan2021Config) {
         let settings = GradientCheckConfig {
             windows: 2,
             per_parameter: 2,
-            seed: 1,
+            seed: 2,
         };
         let report = check_model(&model, case, settings).unwrap();
         let worst = report.parameters.iter().filter_map(|p| p.worst.as_ref());
         let worst = worst.max_by(|a, b| a.error.total_cmp(&b.error));
         assert!(report.error() < 1e-5, "{case:?}: {worst:?}");
         assert!(report.parameters.iter().all(|p| p.compared + p.kinks > 0));
-        assert!(50 * report.kinks() <= report.compared(), "{case:?}");
+        assert!(
+            50 * report.kinks() <= report.compared(),
+            "{case:?}: {} kinks, {} compared",
+            report.kinks(),
+            report.compared()
+        );
     }
 }
 

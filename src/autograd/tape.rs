@@ -500,6 +500,22 @@ pub struct Target<'t, T> {
 }
 
 impl<T: Real> Target<'_, T> {
+    /// Adds `values` to the gradient.
+    pub fn add_values(self, values: &[T]) {
+        if self.fresh {
+            self.data.copy_from_slice(values);
+            return;
+        }
+        super::kernels::vectorised(
+            #[inline(always)]
+            || {
+                for (d, &value) in self.data.iter_mut().zip(values) {
+                    *d += value;
+                }
+            },
+        );
+    }
+
     /// Adds `gradient(i)` to number i of the gradient, for all i.
     #[inline(always)]
     pub fn add(self, gradient: impl Fn(usize) -> T) {

@@ -13,6 +13,9 @@ pub struct BenchStepArgs {
     /// Windows in the batch
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
     batch: u16,
+    /// Parts that the batch is computed in [default: the paper config's]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    shards: Option<u16>,
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
     /// Timed steps; the fastest counts
@@ -28,8 +31,12 @@ pub struct BenchStepArgs {
 /// # Errors
 /// No threads to be had.
 pub fn run(args: BenchStepArgs) -> anyhow::Result<()> {
+    let mut config = ExperimentConfig::default();
+    if let Some(shards) = args.shards {
+        config.schedule.shards = shards.into();
+    }
     let speed = step_speed(
-        &ExperimentConfig::default(),
+        &config,
         args.frames.into(),
         args.batch.into(),
         args.threads.into(),

@@ -1,4 +1,12 @@
 //! Multi-head attention (Vaswani et al. 2017, section 3.2.2).
+//!
+//! Where the tokens are linear in a few numbers, x = E s with s [k] and k far below d, self-attention needs no projections of
+//! its own: with P = [`in_proj`] E, the score of two tokens is s_i^T (P_q,h^T P_k,h) s_j, and the output O sum_j a_ij P_v s_j is
+//! sum_h (O_h P_v,h) (sum_j a_hij s_j). Both matrices in brackets are made once a tape: [`NarrowAttention`].
+//!
+//! [`in_proj`]: MultiHeadAttention::in_projection
+
+use std::ops::Range;
 
 use rand::Rng;
 
@@ -21,6 +29,15 @@ pub struct MultiHeadAttention {
     value_bias: BlockId,
     output: Linear,
     sizes: TransformerSizes,
+}
+
+/// Self-attention of tokens that are linear in k numbers each, made on a tape by [`MultiHeadAttention::narrow`].
+#[derive(Debug, Clone, Copy)]
+pub struct NarrowAttention {
+    /// P_k,h^T P_q,h of each head, `[heads * k, k]`.
+    forms: Var,
+    /// O_h P_v,h of all heads beside each other, `[d, heads * k]`.
+    outputs: Var,
 }
 
 impl MultiHeadAttention {
@@ -77,17 +94,17 @@ impl MultiHeadAttention {
         }
     }
 
-    /// Attention of the tokens of each window to each other, from their projections `[windows * tokens, 3d]`, as
-    /// `[windows * tokens, d]`.
+    /// Attention of the tokens of each window to each other, `[windows * tokens, d]` to the same shape.
     ///
     /// # Errors
     /// Rows that are no whole windows.
     pub fn own<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
-        projected: Var,
+        x: Var,
         tokens: usize,
     ) -> Result<Var, AutogradError> {
+        let projected = self.in_projection.forward(tape, x)?;
         let columns = |k: usize| HeadColumns {
             value: projected,
             start: k * self.sizes.width,
@@ -103,12 +120,72 @@ impl MultiHeadAttention {
         self.output.forward(tape, y)
     }
 
-    /// The projections of queries, keys and values, `[rows, d]` -> `[rows, 3d]`.
+    /// Self-attention for tokens that are linear in k numbers: `basis [k, d]` are the tokens of the k unit vectors. Every token is
+    /// their sum with weights of which those at `ones` add up to 1; the projections' bias goes there.
     ///
     /// # Errors
-    /// An input of another width.
-    pub fn project<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
-        self.in_projection.forward(tape, x)
+    /// A basis of another width.
+    pub fn narrow<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        basis: Var,
+        ones: Range<usize>,
+    ) -> Result<NarrowAttention, AutogradError> {
+        let TransformerSizes {
+            width: d, heads, ..
+        } = self.sizes;
+        let k = tape.shape(basis).first().copied().unwrap_or(0);
+        let weight = tape.block(self.in_projection.weight);
+        let projected = tape.linear(basis, weight, None, false)?;
+        let mask = tape.constant_with(&[k, 1], |out| {
+            out.fill(T::zero());
+            out[ones].fill(T::one());
+        });
+        let bias = tape.block(self.in_projection.bias);
+        let bias = tape.reshape(bias, &[1, 3 * d])?;
+        let bias = tape.mul(bias, mask)?;
+        let projected = tape.add(projected, bias)?;
+        let output = tape.block(self.output.weight);
+        let (mut forms, mut outputs) = (Vec::new(), Vec::new());
+        for h in 0..heads {
+            let columns = |part: usize| {
+                let start = part * d + h * (d / heads);
+                start..start + d / heads
+            };
+            let [q, k, v] = [0, 1, 2].map(|part| tape.columns(projected, columns(part)));
+            forms.push(tape.linear(k?, q?, None, false)?);
+            let output = tape.columns(output, columns(0))?;
+            outputs.push(tape.linear(output, v?, None, false)?);
+        }
+        let forms = tape.stack(&forms)?;
+        Ok(NarrowAttention {
+            forms: tape.reshape(forms, &[heads * k, k])?,
+            outputs: tape.concat(&outputs)?,
+        })
+    }
+
+    /// [`MultiHeadAttention::own`] for the tokens that `narrow` is made for, from their numbers `[windows * tokens, k]`.
+    ///
+    /// # Errors
+    /// Rows that are no whole windows.
+    pub fn own_narrow<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        narrow: NarrowAttention,
+        numbers: Var,
+        tokens: usize,
+    ) -> Result<Var, AutogradError> {
+        let TransformerSizes {
+            width,
+            heads,
+            dropout,
+            ..
+        } = self.sizes;
+        let scale = 1.0 / ((width / heads) as f64).sqrt();
+        let queries = tape.linear(numbers, narrow.forms, None, false)?;
+        let y = tape.shared_attention(queries, numbers, tokens, scale, dropout)?;
+        let bias = tape.block(self.output.bias);
+        tape.linear(y, narrow.outputs, Some(bias), false)
     }
 
     /// The keys and values of a memory, `[rows, d]` -> `[rows, 2d]`.

@@ -9,7 +9,7 @@ mod norm;
 mod positions;
 mod transformer;
 
-pub use attention::MultiHeadAttention;
+pub use attention::{MultiHeadAttention, NarrowAttention};
 pub use init::Initialiser;
 pub use linear::Linear;
 pub use lstm::Lstm;

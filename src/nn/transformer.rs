@@ -75,22 +75,20 @@ impl TransformerEncoderLayer {
         x: Var,
         tokens: usize,
     ) -> Result<Var, AutogradError> {
-        let projected = self.self_attention.project(tape, x)?;
-        self.forward_projected(tape, x, projected, tokens)
+        let y = self.self_attention.own(tape, x, tokens)?;
+        self.forward_attended(tape, x, y)
     }
 
-    /// [`TransformerEncoderLayer::forward`] where the projections `[rows, 3d]` of the tokens are there already.
+    /// [`TransformerEncoderLayer::forward`] where the tokens' attention to each other `y` is there already; both `[rows, d]`.
     ///
     /// # Errors
-    /// Rows that are no whole windows.
-    pub fn forward_projected<T: Real>(
+    /// Inputs of other widths.
+    pub fn forward_attended<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         x: Var,
-        projected: Var,
-        tokens: usize,
+        y: Var,
     ) -> Result<Var, AutogradError> {
-        let y = self.self_attention.own(tape, projected, tokens)?;
         let x = self.norms[0].after(tape, y, x, self.dropout)?;
         let y = self.feed_forward.forward(tape, x)?;
         self.norms[1].after(tape, y, x, self.dropout)
@@ -125,7 +123,7 @@ impl TransformerDecoderLayer {
         }
     }
 
-    /// Keys and values of a memory `[rows, d]` for [`TransformerDecoderLayer::forward_projected`], `[rows, 2d]`.
+    /// Keys and values of a memory `[rows, d]` for [`TransformerDecoderLayer::forward_attended`], `[rows, 2d]`.
     ///
     /// # Errors
     /// An input of another width.
@@ -137,25 +135,25 @@ impl TransformerDecoderLayer {
         self.memory_attention.project_memory(tape, memory)
     }
 
-    /// All tokens `x [windows * tokens, d]` with their projections `[rows, 3d]` and the memory's keys and values `[rows, 2d]`.
+    /// All tokens `x [windows * tokens, d]` with their attention to each other `y`, likewise, and the memory's keys and values
+    /// `[rows, 2d]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.
-    pub fn forward_projected<T: Real>(
+    pub fn forward_attended<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         x: Var,
-        projected: Var,
+        y: Var,
         memory: Var,
         tokens: usize,
     ) -> Result<Var, AutogradError> {
-        let y = self.self_attention.own(tape, projected, tokens)?;
         let x = self.norms[0].after(tape, y, x, self.dropout)?;
         let y = self.memory_attention.to_memory(tape, x, memory, tokens)?;
         self.finish(tape, x, y)
     }
 
-    /// All tokens, with their projections and the memory's made here.
+    /// All tokens `x` and the memory, `[windows * tokens, d]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.
@@ -166,9 +164,9 @@ impl TransformerDecoderLayer {
         memory: Var,
         tokens: usize,
     ) -> Result<Var, AutogradError> {
-        let projected = self.self_attention.project(tape, x)?;
+        let y = self.self_attention.own(tape, x, tokens)?;
         let memory = self.project_memory(tape, memory)?;
-        self.forward_projected(tape, x, projected, memory, tokens)
+        self.forward_attended(tape, x, y, memory, tokens)
     }
 
     /// Token `position` of each window only, `[windows, d]`: all that is asked of a last layer. `x`, `memory

@@ -6,7 +6,7 @@
 
 use std::cell::RefCell;
 
-use super::{MatMut, buffer::Buffer, matrix::Operand};
+use super::{MatMut, buffer::Buffer, matrix::Operand, vectorised};
 
 /// Rows of a packed block of A, filled up: the distance between its columns.
 pub const LEFT_STEP: usize = 16;
@@ -139,16 +139,21 @@ fn copy_rows<const W: usize>(
     to: &mut [f32],
 ) {
     let (data, stride) = (from.matrix.data, from.matrix.stride);
-    for (row, to) in rows.zip(to.as_chunks_mut::<W>().0) {
-        let from = &data[row * stride + cols.start..];
-        match from.first_chunk::<W>() {
-            Some(whole) if cols.len() == W => *to = *whole,
-            _ => {
-                to.fill(0.0);
-                to[..cols.len()].copy_from_slice(&from[..cols.len()]);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (row, to) in rows.zip(to.as_chunks_mut::<W>().0) {
+                let from = &data[row * stride + cols.start..];
+                match from.first_chunk::<W>() {
+                    Some(whole) if cols.len() == W => *to = *whole,
+                    _ => {
+                        to.fill(0.0);
+                        to[..cols.len()].copy_from_slice(&from[..cols.len()]);
+                    }
+                }
             }
-        }
-    }
+        },
+    );
 }
 
 /// Writes the transpose of a block of a matrix as it lies in memory.
@@ -188,13 +193,18 @@ fn pack_left(
     if a.transposed {
         // Whole steps where memory goes on behind the block: what is too much is never read.
         let data = a.matrix.data;
-        for (p, to) in depth.zip(to.as_chunks_mut::<LEFT_STEP>().0) {
-            let from = &data[p * a.matrix.stride + rows.start..];
-            match from.first_chunk::<LEFT_STEP>() {
-                Some(whole) => *to = *whole,
-                None => to[..rows.len()].copy_from_slice(&from[..rows.len()]),
-            }
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                for (p, to) in depth.zip(to.as_chunks_mut::<LEFT_STEP>().0) {
+                    let from = &data[p * a.matrix.stride + rows.start..];
+                    match from.first_chunk::<LEFT_STEP>() {
+                        Some(whole) => *to = *whole,
+                        None => to[..rows.len()].copy_from_slice(&from[..rows.len()]),
+                    }
+                }
+            },
+        );
     } else {
         transpose(kernels, a, rows, depth, to, LEFT_STEP);
     }

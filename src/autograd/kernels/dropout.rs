@@ -67,11 +67,17 @@ pub fn dropout_into<T: Real>(key: u64, p: f64, x: &[T], out: &mut [T]) {
         "a dropout mask has at most 2^32 elements"
     );
     let mask = Dropout::new(key, p);
+    let scale = T::from_f64(mask.scale);
     vectorised(
         #[inline(always)]
         || {
             for (i, (out, x)) in out.iter_mut().zip(x).enumerate() {
-                *out = *x * mask.factor(i as u32);
+                let factor = if mask.keep(i as u32) {
+                    scale
+                } else {
+                    T::zero()
+                };
+                *out = *x * factor;
             }
         },
     );

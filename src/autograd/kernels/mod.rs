@@ -1,4 +1,4 @@
-//! The arithmetic under the engine: matrix products, vectorised exponentials, dropout masks.
+//! The arithmetic under the engine: matrix products, those of attention's small windows, vectorised exponentials, dropout masks.
 //!
 //! The only place of the crate with `unsafe` code. Everything public here is safe: operands are
 //! slices with a shape, and a shape that does not fit its slice or its partners panics.
@@ -22,6 +22,7 @@ mod matrix;
 mod packed;
 mod product;
 mod real;
+mod windows;
 
 #[cfg(test)]
 mod tests;
@@ -32,3 +33,7 @@ pub use matrix::{Mat, MatMut};
 pub use packed::Packed;
 pub use product::{product, product_at, product_bt, product_packed};
 pub use real::Real;
+pub use windows::{
+    CHUNK, WindowRows, WindowWeights, scratch_len, window_scores, window_softmax,
+    window_softmax_backward, window_sums,
+};

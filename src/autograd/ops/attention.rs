@@ -1,23 +1,21 @@
-//! Multi-head attention over many small windows, as one kernel.
+//! Multi-head attention over many small windows, as one kernel, and the core it shares with [`super::shared_attention`].
 //!
 //! ```text
 //! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq], k and v rows [windows * tk], each head h
 //! has columns h * dh .. (h + 1) * dh. For each window and head:
-//! S = Q K^T / sqrt(dh) [tq, tk], P = softmax(S), D = dropout(P), Y = D V.
+//! S = scale Q K^T [tq, tk], P = softmax(S), D = dropout(P), Y = D V, scale = 1 / sqrt(dh).
 //! dV = D^T dY, dD = dY V^T, dP = dropout(dD) with the same mask, dS = P (dP - rowsum(dP P)),
-//! dQ = dS K / sqrt(dh), dK = dS^T Q / sqrt(dh).
+//! dQ = scale dS K, dK = scale dS^T Q.
 //! ```
 //!
 //! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole vectors.
 
-use super::softmax::softmax_backward;
 use super::{argument_error, shapes_error};
-use crate::autograd::kernels::{dropout_into, vectorised};
-use crate::autograd::reduce::sum_with;
+use crate::autograd::kernels::{
+    CHUNK, WindowRows, WindowWeights, dropout_into, scratch_len, vectorised, window_scores,
+    window_softmax, window_softmax_backward, window_sums,
+};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
-
-/// Numbers in a padded chunk of a row of scores.
-const CHUNK: usize = 8;
 
 /// The columns from `start` of a value `[rows, n]`: Q, K or V, wherever a layer's product put them.
 #[derive(Debug, Clone, Copy)]
@@ -49,137 +47,87 @@ impl AttentionShape {
     }
 }
 
-/// Rows of one head's columns in a value.
-#[derive(Clone, Copy)]
-struct Heads<'v, T> {
-    values: &'v [T],
-    stride: usize,
-    start: usize,
+/// Q, K or V in a value whose rows are `stride` numbers long.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Operand {
+    pub(super) columns: HeadColumns,
+    pub(super) stride: usize,
 }
 
-impl<'v, T> Heads<'v, T> {
+impl Operand {
+    /// Rows of `window`, of `tokens` each, with the columns of `head`.
     #[inline(always)]
-    fn row(&self, row: usize, head: usize, width: usize) -> &'v [T] {
-        let from = row * self.stride + self.start + head * width;
-        &self.values[from..from + width]
+    fn window<'v, T>(
+        &self,
+        values: &'v [T],
+        (window, tokens): (usize, usize),
+        (head, width): (usize, usize),
+    ) -> WindowRows<'v, T> {
+        let whole = WindowRows {
+            values,
+            start: self.columns.start,
+            stride: self.stride,
+        };
+        whole.from(window * tokens, head * width)
     }
 }
 
 struct Attention<T> {
-    q: HeadColumns,
-    k: HeadColumns,
-    v: HeadColumns,
+    q: Operand,
+    k: Operand,
+    v: Operand,
     shape: AttentionShape,
-    windows: usize,
+    scale: f64,
     dropout: Option<(u64, f64)>,
     /// P, `[windows, heads, queries, padded keys]`.
     probabilities: Vec<T>,
 }
 
-/// out[i, j] = scale * a_i . b_j for one window and head, i below `queries`, j below `keys`, rows of `out` padded; the padding
-/// gets 0. `transposed` is scratch for b^T, `[chunks, width, CHUNK]`.
-#[inline(always)]
-fn scores<T: Real>(
-    out: &mut [T],
-    transposed: &mut [T],
-    (a, a_row): (Heads<'_, T>, usize),
-    (b, b_row): (Heads<'_, T>, usize),
-    head: usize,
-    shape: AttentionShape,
-    scale: T,
-) {
-    let (width, padded) = (shape.head_width(), shape.padded_keys());
-    transposed.fill(T::zero());
-    for j in 0..shape.keys {
-        let row = b.row(b_row + j, head, width);
-        let base = (j / CHUNK) * width * CHUNK + j % CHUNK;
-        for (d, &x) in row.iter().enumerate() {
-            transposed[base + d * CHUNK] = x;
-        }
-    }
-    for i in 0..shape.queries {
-        let row = a.row(a_row + i, head, width);
-        for (chunk, out) in out[i * padded..(i + 1) * padded]
-            .chunks_exact_mut(CHUNK)
-            .enumerate()
-        {
-            let b = &transposed[chunk * width * CHUNK..(chunk + 1) * width * CHUNK];
-            let mut sums = [T::zero(); CHUNK];
-            for (b, &x) in b.chunks_exact(CHUNK).zip(row) {
-                for (sum, &b) in sums.iter_mut().zip(b) {
-                    *sum += x * b;
-                }
-            }
-            for (out, sum) in out.iter_mut().zip(sums) {
-                *out = sum * scale;
-            }
-        }
-    }
-}
-
-/// y (+)= weight * x, row by row.
-#[inline(always)]
-fn add_scaled<T: Real>(y: &mut [T], weight: T, x: &[T]) {
-    for (y, &x) in y.iter_mut().zip(x) {
-        *y += weight * x;
-    }
+/// What a gradient is a sum of: rows of `other`, weighted by P or dS.
+struct Sum<'w, T> {
+    /// `[windows, heads, queries, padded keys]`
+    weights: &'w [T],
+    /// Whether a result is a key's, a sum over the queries.
+    of_keys: bool,
+    other: (Operand, &'w [T]),
 }
 
 impl<T: Real> Attention<T> {
-    fn heads<'s>(&self, context: &Backward<'s, T>, columns: HeadColumns) -> Heads<'s, T> {
-        heads_of(
-            context.values(columns.value),
-            context.shape(columns.value),
-            columns.start,
-        )
-    }
-
-    /// Adds sum_j weight(i, j) x_j to the gradient of `of`'s row i, for each window and head.
-    #[inline(always)]
-    fn add_products(
-        &self,
-        context: &mut Backward<'_, T>,
-        of: HeadColumns,
-        (rows, others): (usize, usize),
-        x: Heads<'_, T>,
-        weight: impl Fn(usize, usize, usize) -> T,
-    ) {
-        let stride = context.shape(of.value).last().copied().unwrap_or(1);
-        let width = self.shape.head_width();
-        let Some(target) = context.target(of.value) else {
+    /// Adds the sums to the gradient of `of`.
+    fn add_sums(&self, context: &mut Backward<'_, T>, of: Operand, sum: Sum<'_, T>, scratch: &mut [T]) {
+        let Some(target) = context.target(of.columns.value) else {
             return;
         };
         if target.fresh {
             target.data.fill(T::zero());
         }
         let data = target.data;
-        let (windows, heads) = (self.windows, self.shape.heads);
+        let shape = self.shape;
+        let (width, padded) = (shape.head_width(), shape.padded_keys());
+        let block = shape.queries * padded;
+        let (results, others, result, row) = if sum.of_keys {
+            (shape.keys, shape.queries, 1, padded)
+        } else {
+            (shape.queries, shape.keys, padded, 1)
+        };
         vectorised(
             #[inline(always)]
             || {
-                for window in 0..windows {
-                    for head in 0..heads {
-                        for i in 0..rows {
-                            let from =
-                                (window * rows + i) * stride + of.start + head * width;
-                            let row = &mut data[from..from + width];
-                            for j in 0..others {
-                                let x = x.row(window * others + j, head, width);
-                                add_scaled(row, weight(window * heads + head, i, j), x);
-                            }
-                        }
-                    }
+                for (k, values) in sum.weights.chunks_exact(block).enumerate() {
+                    let (window, head) = (k / shape.heads, k % shape.heads);
+                    let from = window * results * of.stride + of.columns.start + head * width;
+                    let (other, other_values) = sum.other;
+                    let x = other.window(other_values, (window, others), (head, width));
+                    let weights = WindowWeights {
+                        values,
+                        result,
+                        row,
+                    };
+                    let out = (&mut data[from..], of.stride, results);
+                    window_sums(out, weights, (x, others), width, true, scratch);
                 }
             },
         );
-    }
-}
-
-fn heads_of<'v, T>(values: &'v [T], shape: &[usize], start: usize) -> Heads<'v, T> {
-    Heads {
-        values,
-        stride: shape.last().copied().unwrap_or(1),
-        start,
     }
 }
 
@@ -188,38 +136,41 @@ impl<T: Real> Operation<T> for Attention<T> {
         let shape = self.shape;
         let (width, padded) = (shape.head_width(), shape.padded_keys());
         let block = shape.queries * padded;
-        let (q, k, v) = (
-            self.heads(context, self.q),
-            self.heads(context, self.k),
-            self.heads(context, self.v),
-        );
-        let upstream = heads_of(dy, &[shape.width], 0);
+        let values = |operand: Operand| context.values(operand.columns.value);
+        let (q, k, v) = (values(self.q), values(self.k), values(self.v));
+        // The output's rows hold all heads, and nothing else.
+        let upstream = Operand {
+            columns: HeadColumns {
+                start: 0,
+                ..self.q.columns
+            },
+            stride: shape.width,
+        };
+        let dy = &*dy;
         let p = &self.probabilities;
+        let mut scratch = context.take(scratch_len(shape.queries.max(shape.keys), width));
 
         let mut dropped = context.take(p.len());
         match self.dropout {
             Some((key, rate)) => dropout_into(key, rate, p, &mut dropped),
             None => dropped.copy_from_slice(p),
         }
-        let at = |row: usize, i: usize, j: usize| row * block + i * padded + j;
-        self.add_products(
-            context,
-            self.v,
-            (shape.keys, shape.queries),
-            upstream,
-            |row, j, i| dropped[at(row, i, j)],
-        );
+        let sum = Sum {
+            weights: &dropped,
+            of_keys: true,
+            other: (upstream, dy),
+        };
+        self.add_sums(context, self.v, sum, &mut scratch);
 
         let mut ds = dropped;
-        let mut transposed = context.take(padded * width);
         vectorised(
             #[inline(always)]
             || {
-                for (row, ds) in ds.chunks_exact_mut(block).enumerate() {
-                    let (window, head) = (row / shape.heads, row % shape.heads);
-                    let rows = (upstream, window * shape.queries);
-                    let columns = (v, window * shape.keys);
-                    scores(ds, &mut transposed, rows, columns, head, shape, T::one());
+                for (k, ds) in ds.chunks_exact_mut(block).enumerate() {
+                    let (window, head) = (k / shape.heads, (k % shape.heads, width));
+                    let a = upstream.window(dy, (window, shape.queries), head);
+                    let b = self.v.window(v, (window, shape.keys), head);
+                    window_scores(ds, a, (b, shape.keys), width, T::one(), &mut scratch);
                 }
             },
         );
@@ -228,34 +179,20 @@ impl<T: Real> Operation<T> for Attention<T> {
             dropout_into(key, rate, &ds, &mut dp);
             context.give(std::mem::replace(&mut ds, dp));
         }
-        let scale = T::one() / T::from_f64(width as f64).sqrt();
         vectorised(
             #[inline(always)]
-            || {
-                for (ds, p) in ds.chunks_exact_mut(padded).zip(p.chunks_exact(padded)) {
-                    softmax_backward(ds, p);
-                    for d in ds {
-                        *d *= scale;
-                    }
-                }
-            },
+            || window_softmax_backward(&mut ds, p, shape.keys, T::from_f64(self.scale)),
         );
-        self.add_products(
-            context,
-            self.q,
-            (shape.queries, shape.keys),
-            k,
-            |row, i, j| ds[at(row, i, j)],
-        );
-        self.add_products(
-            context,
-            self.k,
-            (shape.keys, shape.queries),
-            q,
-            |row, j, i| ds[at(row, i, j)],
-        );
+        for (of, of_keys, other) in [(self.q, false, (self.k, k)), (self.k, true, (self.q, q))] {
+            let sum = Sum {
+                weights: &ds,
+                of_keys,
+                other,
+            };
+            self.add_sums(context, of, sum, &mut scratch);
+        }
         context.give(ds);
-        context.give(transposed);
+        context.give(scratch);
     }
 
     fn release(&mut self, workspace: &mut Workspace<T>) {
@@ -263,28 +200,83 @@ impl<T: Real> Operation<T> for Attention<T> {
     }
 }
 
-/// Softmax over the first `keys` numbers of each padded row; the padding becomes 0.
-pub(super) fn padded_softmax<T: Real>(rows: &mut [T], keys: usize, padded: usize) {
+/// Records an attention whose operands are known to fit; the output has `shape.width` columns for each query.
+pub(super) fn record<T: Real>(
+    tape: &mut Tape<'_, T>,
+    name: &'static str,
+    (q, k, v): (Operand, Operand, Operand),
+    (windows, shape): (usize, AttentionShape),
+    scale: f64,
+    p: f64,
+    output: &[usize],
+) -> Var {
+    let (width, padded) = (shape.head_width(), shape.padded_keys());
+    let block = shape.queries * padded;
+    let mut probabilities = tape.take(windows * shape.heads * block);
+    let mut scratch = tape.take(scratch_len(shape.queries.max(shape.keys), width));
+    let mut y = tape.take(windows * shape.queries * shape.width);
+    let dropout = tape
+        .next_dropout_key()
+        .filter(|_| p > 0.0)
+        .map(|key| (key, p));
+    let mut dropped = match dropout {
+        Some(_) => tape.take(probabilities.len()),
+        None => Vec::new(),
+    };
+    let values = |operand: Operand| tape.values(operand.columns.value);
+    let (queries, keys, values) = (values(q), values(k), values(v));
     vectorised(
         #[inline(always)]
         || {
-            for row in rows.chunks_exact_mut(padded) {
-                let mut max = row[0];
-                for &x in &row[1..keys] {
-                    // A NaN wins, to show in the result.
-                    max = if x > max || x.is_nan() { x } else { max };
-                }
-                for x in &mut *row {
-                    *x = (*x - max).exp_lane();
-                }
-                row[keys..].fill(T::zero());
-                let inverse = T::one() / sum_with(padded, |j| row[j]);
-                for x in row {
-                    *x *= inverse;
-                }
+            for (row, out) in probabilities.chunks_exact_mut(block).enumerate() {
+                let (window, head) = (row / shape.heads, (row % shape.heads, width));
+                let a = q.window(queries, (window, shape.queries), head);
+                let b = k.window(keys, (window, shape.keys), head);
+                let scale = T::from_f64(scale);
+                window_scores(out, a, (b, shape.keys), width, scale, &mut scratch);
+            }
+            window_softmax(&mut probabilities, shape.keys);
+        },
+    );
+    let weights = match dropout {
+        Some((key, p)) => {
+            dropout_into(key, p, &probabilities, &mut dropped);
+            &dropped
+        }
+        None => &probabilities,
+    };
+    vectorised(
+        #[inline(always)]
+        || {
+            for (row, weights) in weights.chunks_exact(block).enumerate() {
+                let (window, head) = (row / shape.heads, row % shape.heads);
+                let from = window * shape.queries * shape.width + head * width;
+                let x = v.window(values, (window, shape.keys), (head, width));
+                let weights = WindowWeights {
+                    values: weights,
+                    result: padded,
+                    row: 1,
+                };
+                let out = (&mut y[from..], shape.width, shape.queries);
+                window_sums(out, weights, (x, shape.keys), width, false, &mut scratch);
             }
         },
     );
+    tape.give(scratch);
+    tape.give(dropped);
+    if !tape.is_recording() {
+        tape.give(std::mem::take(&mut probabilities));
+    }
+    let inputs = [q, k, v].map(|operand| operand.columns.value);
+    tape.record(name, &inputs, output, y, || Attention {
+        q,
+        k,
+        v,
+        shape,
+        scale,
+        dropout,
+        probabilities,
+    })
 }
 
 impl<T: Real> Tape<'_, T> {
@@ -309,79 +301,15 @@ impl<T: Real> Tape<'_, T> {
                 return Err(shapes_error("attention", left, right, expected));
             }
         }
-        let (width, padded) = (shape.head_width(), shape.padded_keys());
-        let block = shape.queries * padded;
-        let mut probabilities = self.take(windows * shape.heads * block);
-        let mut transposed = self.take(padded * width);
-        let mut y = self.take(windows * shape.queries * shape.width);
-        let dropout = self
-            .next_dropout_key()
-            .filter(|_| p > 0.0)
-            .map(|key| (key, p));
-        let mut dropped = match dropout {
-            Some(_) => self.take(probabilities.len()),
-            None => Vec::new(),
+        let operand = |columns: HeadColumns| Operand {
+            columns,
+            stride: self.rows_and_columns(columns.value).1,
         };
-        let heads = |columns: HeadColumns| {
-            let value = columns.value;
-            heads_of(self.values(value), self.shape(value), columns.start)
-        };
-        let (queries, keys, values) = (heads(q), heads(k), heads(v));
-        let scale = T::one() / T::from_f64(width as f64).sqrt();
-        vectorised(
-            #[inline(always)]
-            || {
-                for (row, out) in probabilities.chunks_exact_mut(block).enumerate() {
-                    let (window, head) = (row / shape.heads, row % shape.heads);
-                    let a = (queries, window * shape.queries);
-                    let b = (keys, window * shape.keys);
-                    scores(out, &mut transposed, a, b, head, shape, scale);
-                }
-            },
-        );
-        padded_softmax(&mut probabilities, shape.keys, padded);
-        let weights = match dropout {
-            Some((key, p)) => {
-                dropout_into(key, p, &probabilities, &mut dropped);
-                &dropped
-            }
-            None => &probabilities,
-        };
-        y.fill(T::zero());
-        vectorised(
-            #[inline(always)]
-            || {
-                for (row, weights) in weights.chunks_exact(block).enumerate() {
-                    let (window, head) = (row / shape.heads, row % shape.heads);
-                    for i in 0..shape.queries {
-                        let from = (window * shape.queries + i) * shape.width + head * width;
-                        let y = &mut y[from..from + width];
-                        for j in 0..shape.keys {
-                            let v = values.row(window * shape.keys + j, head, width);
-                            add_scaled(y, weights[i * padded + j], v);
-                        }
-                    }
-                }
-            },
-        );
-        self.give(transposed);
-        self.give(dropped);
-        if !self.is_recording() {
-            self.give(std::mem::take(&mut probabilities));
-        }
-        let rows = windows * shape.queries;
-        let inputs = [q.value, k.value, v.value];
-        Ok(
-            self.record("attention", &inputs, &[rows, shape.width], y, || Attention {
-                q,
-                k,
-                v,
-                shape,
-                windows,
-                dropout,
-                probabilities,
-            }),
-        )
+        let operands = (operand(q), operand(k), operand(v));
+        let scale = 1.0 / (shape.head_width() as f64).sqrt();
+        let output = [windows * shape.queries, shape.width];
+        let sizes = (windows, shape);
+        Ok(record(self, "attention", operands, sizes, scale, p, &output))
     }
 
     /// Number of windows of `tokens` rows in a value that holds the columns of all heads.

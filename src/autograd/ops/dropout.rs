@@ -21,7 +21,7 @@ impl<T: Real> Operation<T> for Dropout {
         let mut dx = context.take(dy.len());
         dropout_into(self.key, self.p, dy, &mut dx);
         if let Some(target) = context.target(self.x) {
-            target.add(|i| dx[i]);
+            target.add_values(&dx);
         }
         context.give(dx);
     }

@@ -31,7 +31,10 @@ fn sum_into<T: Real>(z: &mut [T], x: &[T], residual: Option<&[T]>, dropout: Opti
         None => z.copy_from_slice(x),
     }
     if let Some(residual) = residual {
-        vectorised(|| z.iter_mut().zip(residual).for_each(|(z, &r)| *z += r));
+        vectorised(
+            #[inline(always)]
+            || z.iter_mut().zip(residual).for_each(|(z, &r)| *z += r),
+        );
     }
 }
 
@@ -55,6 +58,9 @@ impl<T: Real> Operation<T> for LayerNorm<T> {
                     .zip(self.statistics.chunks_exact(2))
                 {
                     let (mean, inverse) = (statistics[0], statistics[1]);
+                    // Lengths that the compiler sees, for loops without bounds checks.
+                    let (dgamma, dbeta) = (&mut dgamma[..columns], &mut dbeta[..columns]);
+                    let (dy, z, gamma) = (&mut dy[..columns], &mut z[..columns], &gamma[..columns]);
                     for j in 0..columns {
                         z[j] = (z[j] - mean) * inverse;
                         dgamma[j] += dy[j] * z[j];
@@ -70,21 +76,21 @@ impl<T: Real> Operation<T> for LayerNorm<T> {
             },
         );
         if let Some(target) = context.target(self.gamma) {
-            target.add(|j| dgamma[j]);
+            target.add_values(dgamma);
         }
         if let Some(target) = context.target(self.beta) {
-            target.add(|j| dbeta[j]);
+            target.add_values(dbeta);
         }
         if let Some(target) = self.residual.and_then(|residual| context.target(residual)) {
-            target.add(|i| dy[i]);
+            target.add_values(dy);
         }
         if let Some(target) = context.target(self.x) {
             match self.dropout {
-                None => target.add(|i| dy[i]),
+                None => target.add_values(dy),
                 Some((key, p)) if target.fresh => dropout_into(key, p, dy, target.data),
                 Some((key, p)) => {
                     dropout_into(key, p, dy, &mut z);
-                    target.add(|i| z[i]);
+                    target.add_values(&z);
                 }
             }
         }
@@ -133,6 +139,7 @@ pub(super) fn layer_norm<T: Real>(
                     .chunks_exact_mut(columns)
                     .zip(statistics.chunks_exact_mut(2))
                 {
+                    let (z, g, b) = (&mut z[..columns], &g[..columns], &b[..columns]);
                     let mean = sum_with(columns, |j| z[j]) * scale;
                     let variance =
                         sum_with(columns, |j| (z[j] - mean) * (z[j] - mean)) * scale;

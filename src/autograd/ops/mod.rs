@@ -49,6 +49,7 @@ operations!(
     relu,
     reshape,
     rows,
+    shared_attention,
     sigmoid,
     softmax,
     sqrt,

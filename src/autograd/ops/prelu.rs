@@ -18,19 +18,31 @@ impl<T: Real> Operation<T> for Prelu {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
         let (x, slope) = (context.values(self.x), context.values(self.slope)[0]);
         if let Some(target) = context.target(self.slope) {
-            let sum = vectorised(|| {
-                sum_with(x.len(), |i| {
-                    if x[i] > T::zero() {
-                        T::zero()
-                    } else {
-                        dy[i] * x[i]
-                    }
-                })
-            });
+            let dy = &dy[..x.len()];
+            let sum = vectorised(
+                #[inline(always)]
+                || {
+                    sum_with(x.len(), |i| {
+                        if x[i] > T::zero() {
+                            T::zero()
+                        } else {
+                            dy[i] * x[i]
+                        }
+                    })
+                },
+            );
             target.add(|_| sum);
         }
         if let Some(target) = context.target(self.x) {
-            target.add(|i| if x[i] > T::zero() { dy[i] } else { slope * dy[i] });
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (dy, &x) in dy.iter_mut().zip(x) {
+                        *dy = if x > T::zero() { *dy } else { slope * *dy };
+                    }
+                },
+            );
+            target.add_values(dy);
         }
     }
 }
@@ -48,11 +60,14 @@ impl<T: Real> Tape<'_, T> {
         let shape = self.shape(x).to_vec();
         let mut y = self.take(self.values(x).len());
         let (values, a) = (self.values(x), self.values(slope)[0]);
-        vectorised(|| {
-            for (y, &x) in y.iter_mut().zip(values) {
-                *y = if x > T::zero() { x } else { a * x };
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for (y, &x) in y.iter_mut().zip(values) {
+                    *y = if x > T::zero() { x } else { a * x };
+                }
+            },
+        );
         Ok(self.record("prelu", &[x, slope], &shape, y, || Prelu { x, slope }))
     }
 }

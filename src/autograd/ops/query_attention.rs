@@ -10,11 +10,11 @@
 //! dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du, dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
 //! ```
 
-use super::attention::padded_softmax;
-use super::softmax::softmax_backward;
 use super::{argument_error, shapes_error};
 use crate::autograd::kernels::{
-    Mat, MatMut, dropout_into, product, product_bt, product_packed, vectorised,
+    CHUNK, Mat, MatMut, WindowRows, WindowWeights, dropout_into, product, product_bt,
+    product_packed, scratch_len, vectorised, window_scores, window_softmax,
+    window_softmax_backward, window_sums,
 };
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
@@ -42,7 +42,7 @@ struct Sizes {
 
 impl Sizes {
     fn padded(&self) -> usize {
-        self.tokens.next_multiple_of(8)
+        self.tokens.next_multiple_of(CHUNK)
     }
 
     /// Columns of all heads of a query, d.
@@ -52,6 +52,21 @@ impl Sizes {
 
     fn scale<T: Real>(&self) -> T {
         T::one() / T::from_f64(self.head_width as f64).sqrt()
+    }
+
+    /// Length of the scratch of a window's products.
+    fn scratch_len(&self) -> usize {
+        scratch_len(self.tokens.max(self.heads), self.width)
+    }
+}
+
+/// `values [rows, width]` as rows of a window.
+#[inline(always)]
+fn rows<T>(values: &[T], width: usize) -> WindowRows<'_, T> {
+    WindowRows {
+        values,
+        start: 0,
+        stride: width,
     }
 }
 
@@ -93,40 +108,40 @@ fn columns_mut<T: Real>(
 }
 
 /// out[b, h, j] = scale * a[b, h] . x[b, j]; the padding gets 0.
-#[inline(always)]
-fn scores<T: Real>(out: &mut [T], a: &[T], x: &[T], sizes: Sizes, scale: T) {
-    let (n, width, heads) = (sizes.tokens, sizes.width, sizes.heads);
-    for (row, (out, a)) in out
-        .chunks_exact_mut(sizes.padded())
-        .zip(a.chunks_exact(width))
-        .enumerate()
-    {
-        let window = &x[row / heads * n * width..][..n * width];
-        for (out, x) in out.iter_mut().zip(window.chunks_exact(width)) {
-            *out = sum_with(width, |d| a[d] * x[d]) * scale;
-        }
-        out[n..].fill(T::zero());
-    }
+fn scores<T: Real>(out: &mut [T], a: &[T], x: &[T], sizes: Sizes, scale: T, scratch: &mut [T]) {
+    vectorised(
+        #[inline(always)]
+        || {
+            for (window, out) in out
+                .chunks_exact_mut(sizes.heads * sizes.padded())
+                .enumerate()
+            {
+                let a = rows(a, sizes.width).from(window * sizes.heads, 0);
+                let x = rows(x, sizes.width).from(window * sizes.tokens, 0);
+                window_scores(out, a, (x, sizes.tokens), sizes.width, scale, scratch);
+            }
+        },
+    );
 }
 
-/// out[b, h] = scale * sum_j weights[b, h, j] x[b, j].
-#[inline(always)]
-fn weighted_sums<T: Real>(out: &mut [T], weights: &[T], x: &[T], sizes: Sizes, scale: T) {
-    let (n, width, heads) = (sizes.tokens, sizes.width, sizes.heads);
-    for (row, (out, weights)) in out
-        .chunks_exact_mut(width)
-        .zip(weights.chunks_exact(sizes.padded()))
-        .enumerate()
-    {
-        let window = &x[row / heads * n * width..][..n * width];
-        out.fill(T::zero());
-        for (x, &weight) in window.chunks_exact(width).zip(weights) {
-            let weight = weight * scale;
-            for (out, &x) in out.iter_mut().zip(x) {
-                *out += weight * x;
+/// out[b, h] = sum_j weights[b, h, j] x[b, j].
+fn weighted_sums<T: Real>(out: &mut [T], weights: &[T], x: &[T], sizes: Sizes, scratch: &mut [T]) {
+    let (width, padded) = (sizes.width, sizes.padded());
+    vectorised(
+        #[inline(always)]
+        || {
+            for (window, out) in out.chunks_exact_mut(sizes.heads * width).enumerate() {
+                let weights = WindowWeights {
+                    values: &weights[window * sizes.heads * padded..],
+                    result: padded,
+                    row: 1,
+                };
+                let x = rows(x, width).from(window * sizes.tokens, 0);
+                let out = (out, width, sizes.heads);
+                window_sums(out, weights, (x, sizes.tokens), width, false, scratch);
             }
-        }
-    }
+        },
+    );
 }
 
 impl<T: Real> Operation<T> for QueryAttention<T> {
@@ -172,11 +187,12 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
         }
 
         // ds in place of dm.
+        let mut scratch = context.take(sizes.scratch_len());
         let mut ds = context.take(batch * heads * padded);
+        scores(&mut ds, &dz, x, sizes, T::one(), &mut scratch);
         vectorised(
             #[inline(always)]
             || {
-                scores(&mut ds, &dz, x, sizes, T::one());
                 for (row, (ds, dy)) in ds
                     .chunks_exact_mut(padded)
                     .zip(dy.chunks_exact(dh))
@@ -193,35 +209,30 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
             dropout_into(key, rate, &ds, &mut dp);
             context.give(std::mem::replace(&mut ds, dp));
         }
-        let scale = sizes.scale();
-        let mut du = context.take(batch * heads * width);
         vectorised(
             #[inline(always)]
-            || {
-                for (ds, p) in ds.chunks_exact_mut(padded).zip(self.p.chunks_exact(padded)) {
-                    softmax_backward(ds, p);
-                }
-                weighted_sums(&mut du, &ds, x, sizes, scale);
-            },
+            || window_softmax_backward(&mut ds, &self.p, tokens, sizes.scale()),
         );
+        let mut du = context.take(batch * heads * width);
+        weighted_sums(&mut du, &ds, x, sizes, &mut scratch);
 
         if let Some(target) = context.target(self.x) {
-            if target.fresh {
-                target.data.fill(T::zero());
-            }
-            let data = target.data;
+            let (fresh, data) = (target.fresh, target.data);
             vectorised(
                 #[inline(always)]
                 || {
-                    for row in 0..batch * heads {
-                        let window = row / heads * tokens * width;
-                        let (dz, u) = (&dz[row * width..][..width], &self.u[row * width..][..width]);
-                        for j in 0..tokens {
-                            let (m, s) = (self.m[row * padded + j], ds[row * padded + j] * scale);
-                            let dx = &mut data[window + j * width..][..width];
-                            for d in 0..width {
-                                dx[d] += m * dz[d] + s * u[d];
-                            }
+                    for (window, dx) in data.chunks_exact_mut(tokens * width).enumerate() {
+                        let parts = [(&self.m, &dz), (&ds, &self.u)];
+                        for (k, (weights, rows_of)) in parts.into_iter().enumerate() {
+                            let weights = WindowWeights {
+                                values: &weights[window * heads * padded..],
+                                result: 1,
+                                row: padded,
+                            };
+                            let a = rows(rows_of, width).from(window * heads, 0);
+                            let out = (&mut *dx, width, tokens);
+                            let accumulate = k > 0 || !fresh;
+                            window_sums(out, weights, (a, heads), width, accumulate, &mut scratch);
                         }
                     }
                 },
@@ -245,7 +256,7 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
                 }
             }
         }
-        for buffer in [dz, ds, du] {
+        for buffer in [dz, ds, du, scratch] {
             context.give(buffer);
         }
     }
@@ -285,6 +296,7 @@ impl<T: Real> Tape<'_, T> {
         let mut attention = self.take(batch * heads * padded);
         let mut m = self.take(batch * heads * padded);
         let mut y = self.take(batch * all);
+        let mut scratch = self.take(sizes.scratch_len());
         let dropout = self
             .next_dropout_key()
             .filter(|_| p > 0.0)
@@ -298,19 +310,16 @@ impl<T: Real> Tape<'_, T> {
                 None => product(q_h, Mat::new(self.values(weight), dh, width), u_h, false),
             }
         }
+        scores(&mut attention, &u, tokens_x, sizes, sizes.scale(), &mut scratch);
         vectorised(
             #[inline(always)]
-            || scores(&mut attention, &u, tokens_x, sizes, sizes.scale()),
+            || window_softmax(&mut attention, tokens),
         );
-        padded_softmax(&mut attention, tokens, padded);
         match dropout {
             Some((key, rate)) => dropout_into(key, rate, &attention, &mut m),
             None => m.copy_from_slice(&attention),
         }
-        vectorised(
-            #[inline(always)]
-            || weighted_sums(&mut z, &m, tokens_x, sizes, T::one()),
-        );
+        weighted_sums(&mut z, &m, tokens_x, sizes, &mut scratch);
         let bias = self.values(weights.value_bias);
         for (row, y) in y.chunks_exact_mut(dh).enumerate() {
             let sum: T = m[row * padded..(row + 1) * padded].iter().copied().sum();
@@ -325,6 +334,7 @@ impl<T: Real> Tape<'_, T> {
                 None => product_bt(z_h, Mat::new(self.values(weight), dh, width), y_h, true),
             }
         }
+        self.give(scratch);
         let mut inputs = vec![q, x, weights.value_bias];
         inputs.extend_from_slice(&weights.keys);
         inputs.extend_from_slice(&weights.values);

@@ -14,7 +14,7 @@ struct Reshape {
 impl<T: Real> Operation<T> for Reshape {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
         if let Some(target) = context.target(self.x) {
-            target.add(|i| dy[i]);
+            target.add_values(dy);
         }
     }
 }

@@ -20,7 +20,7 @@ impl<T: Real> Operation<T> for Softmax {
             softmax_backward(dy, y);
         }
         if let Some(target) = context.target(self.x) {
-            target.add(|i| dy[i]);
+            target.add_values(dy);
         }
     }
 }

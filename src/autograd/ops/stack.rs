@@ -17,7 +17,7 @@ impl<T: Real> Operation<T> for Stack {
         for (k, &part) in self.parts.iter().enumerate() {
             if let Some(target) = context.target(part) {
                 let dy = &dy[k * len..(k + 1) * len];
-                target.add(|i| dy[i]);
+                target.add_values(dy);
             }
         }
     }

@@ -4,8 +4,8 @@
 //! values, the mixture segment what was fed for the frames up to t. Frames beyond an end of the transition repeat it.
 //!
 //! A token's embedding is linear in its c numbers plus a constant of its position, so it is one product with the numbers
-//! and a one-hot position, `[c + u]`; so are its first projections to queries, keys and values. Those composed weights are made
-//! once a tape.
+//! and a one-hot position, `[c + u]`, and the first layer's self-attention is a [`NarrowAttention`] of them. Its weights are
+//! made once a tape.
 
 use ndarray::Array2;
 use rand::Rng;
@@ -14,8 +14,8 @@ use super::config::{Controllers, Pan2021Config};
 use super::units::constant;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::nn::{
-    Initialiser, Linear, Mlp, TransformerDecoderLayer, TransformerEncoderLayer,
-    sinusoidal_positions,
+    Initialiser, Linear, Mlp, MultiHeadAttention, NarrowAttention, TransformerDecoderLayer,
+    TransformerEncoderLayer, sinusoidal_positions,
 };
 
 /// Windows coded at once where few are asked for: products with few rows are slow.
@@ -91,8 +91,7 @@ struct Composed {
 struct Embedding {
     /// `[d, c + u]`
     token: Var,
-    /// `[3d, c + u]`
-    projections: Var,
+    attention: NarrowAttention,
 }
 
 struct Memory {
@@ -197,17 +196,17 @@ impl TransformerController {
         let decoder = &self.decoder[0].self_attention;
         Ok(Composed {
             one_hot,
-            target: self.compose(tape, self.target_projection, encoder.in_projection)?,
-            mixture: self.compose(tape, self.mixture_projection, decoder.in_projection)?,
+            target: self.compose(tape, self.target_projection, encoder)?,
+            mixture: self.compose(tape, self.mixture_projection, decoder)?,
         })
     }
 
-    /// The weights from (numbers, one-hot position) to tokens and to their first projections.
+    /// The weights from (numbers, one-hot position) to tokens, and the first self-attention of these.
     fn compose<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         embedding: Linear,
-        projection: Linear,
+        attention: &MultiHeadAttention,
     ) -> Result<Embedding, AutogradError> {
         let (u, d) = self.positions.dim();
         let (weight, bias) = (tape.block(embedding.weight), tape.block(embedding.bias));
@@ -218,16 +217,16 @@ impl TransformerController {
         let positions = tape.add(positions, bias)?;
         let token = tape.concat(&[weight, positions])?;
 
-        let (weight, bias) = (tape.block(projection.weight), tape.block(projection.bias));
-        let projected = tape.matmul(weight, token)?;
-        // The bias goes where the position's one is.
-        let mut mask = vec![0.0; channels];
-        mask.resize(channels + u, 1.0);
-        let mask = constant(tape, &[1, channels + u], &mask);
-        let bias = tape.reshape(bias, &[3 * d, 1])?;
-        let bias = tape.mul(bias, mask)?;
-        let projections = tape.add(projected, bias)?;
-        Ok(Embedding { token, projections })
+        let k = channels + u;
+        let identity = tape.constant_with(&[k, k], |out| {
+            out.fill(T::zero());
+            out.iter_mut().step_by(k + 1).for_each(|x| *x = T::one());
+        });
+        let basis = tape.linear(identity, token, None, false)?;
+        Ok(Embedding {
+            token,
+            attention: attention.narrow(tape, basis, channels..k)?,
+        })
     }
 
     /// Codes target segments `[rows, c + u]`: the encoder's output and the decoders' keys and values of it.
@@ -239,8 +238,10 @@ impl TransformerController {
         u: usize,
     ) -> Result<(Var, Vec<Var>), AutogradError> {
         let x = tape.linear(segments, embedding.token, None, false)?;
-        let projected = tape.linear(segments, embedding.projections, None, false)?;
-        let mut x = self.encoder[0].forward_projected(tape, x, projected, u)?;
+        let first = &self.encoder[0];
+        let attention = &first.self_attention;
+        let y = attention.own_narrow(tape, embedding.attention, segments, u)?;
+        let mut x = first.forward_attended(tape, x, y)?;
         for layer in &self.encoder[1..] {
             x = layer.forward(tape, x, u)?;
         }
@@ -271,12 +272,13 @@ impl TransformerController {
         let (last, before_last) = self.split_decoder();
         let mut x = tape.linear(segments, embedding.token, None, false)?;
         for (k, (layer, &memory)) in before_last.iter().zip(projected_memory).enumerate() {
-            let projected = if k == 0 {
-                tape.linear(segments, embedding.projections, None, false)?
+            let attention = &layer.self_attention;
+            let y = if k == 0 {
+                attention.own_narrow(tape, embedding.attention, segments, u)?
             } else {
-                layer.self_attention.project(tape, x)?
+                attention.own(tape, x, u)?
             };
-            x = layer.forward_projected(tape, x, projected, memory, u)?;
+            x = layer.forward_attended(tape, x, y, memory, u)?;
         }
         let x = last.forward_single(tape, x, memory, u, u / 2)?;
         self.output.forward(tape, x)
