@@ -1,4 +1,4 @@
-"""Training steps and generation: PyTorch plain and optimised, and keydance, timed in turn."""
+"""Training steps, generation and single layers: PyTorch plain and optimised, and keydance, timed in turn."""
 
 import ctypes
 import json
@@ -132,6 +132,61 @@ def time_generation(arguments, fuse, count, threads):
         print("  ms a frame: " + ", ".join(f"{n} {1e3 / s:.2f}" for n, s in best.items()))
 
 
+class LstmAndLinear(torch.nn.Module):
+    """The model's first LSTM and a linear layer, on whole sequences."""
+
+    def __init__(self):
+        super().__init__()
+        self.lstm = torch.nn.LSTM(1024, 256)
+        self.head = torch.nn.Linear(256, 142)
+
+    def forward(self, x):
+        return self.head(self.lstm(x)[0])
+
+
+def encoder_layers():
+    layer = partial(torch.nn.TransformerEncoderLayer, 256, 8, 256, DROPOUT, batch_first=True)
+    return torch.nn.Sequential(layer(), layer())
+
+
+def time_layers(arguments):
+    """Forward, a sum of squares, backward: milliseconds, the best of some steps each turn."""
+    torch.set_num_threads(THREADS)
+    cases = {
+        "lstm_ms": (
+            "LSTM 1024 -> 256 and linear, 128 x 30",
+            LstmAndLinear(),
+            torch.randn(30, 128, 1024),
+        ),
+        "encoder_layers_ms": (
+            "two encoder layers, 128 windows of 7",
+            encoder_layers(),
+            torch.randn(128, 7, 256, requires_grad=True),
+        ),
+    }
+    for key, (title, module, x) in cases.items():
+
+        def step(module=module, x=x):
+            module.zero_grad()
+            x.grad = None
+            module(x).square().sum().backward()
+
+        step()
+        runs = {"PyTorch": lambda: min(1e3 * seconds(step) for _ in range(5))}
+        if arguments.keydance:
+            options = ["--threads", THREADS]
+            runs["keydance"] = lambda: keydance(arguments.keydance, "bench-layers", *options)[key]
+        best = {name: float("inf") for name in runs}
+        for _ in range(arguments.rounds):
+            for name, run in runs.items():
+                best[name] = min(best[name], run())
+        print(f"\n{title}, forward and backward, {THREADS} threads, ms")
+        for name, time_taken in best.items():
+            print(f"  {name:<34} {time_taken:10.1f}", flush=True)
+        if "keydance" in best:
+            print(f"  PyTorch / keydance: {best['PyTorch'] / best['keydance']:.2f}")
+
+
 def processor():
     try:
         with open("/proc/cpuinfo") as lines:
@@ -163,6 +218,7 @@ def time_all(arguments):
     trainers[SHARDED].close()
     for count, threads in ((1, 1), (64, THREADS)):
         time_generation(arguments, fuse, count, threads)
+    time_layers(arguments)
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
     print(
         f"\nmost memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.1f} GiB in this process, "

@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand.
 
 mod bench_generate;
+mod bench_layers;
 mod bench_step;
 mod bvh;
 mod demo;
@@ -36,6 +37,8 @@ pub struct Cli {
 enum Command {
     /// Time the generation of frames
     BenchGenerate(bench_generate::BenchGenerateArgs),
+    /// Time an LSTM and two Transformer encoder layers, forward and backward
+    BenchLayers(bench_layers::BenchLayersArgs),
     /// Time a training step
     BenchStep(bench_step::BenchStepArgs),
     Demo(demo::DemoArgs),
@@ -63,6 +66,7 @@ impl Cli {
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
+            Command::BenchLayers(args) => bench_layers::run(args)?,
             Command::BenchStep(args) => bench_step::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Bvh(args) => bvh::run(args)?,

@@ -4,6 +4,7 @@ mod attention;
 mod init;
 mod linear;
 mod lstm;
+pub mod measure;
 mod mlp;
 mod norm;
 mod positions;

@@ -77,7 +77,7 @@ impl Default for ScheduleConfig {
             min_len_step: 4,
             min_len_every: 5,
             batch_size: 128,
-            shards: 8,
+            shards: 4,
             fraction: 1.0,
         }
     }
