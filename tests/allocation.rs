@@ -74,7 +74,7 @@ fn large_bytes_by_step(config: &Pan2021Config, feed: Feed) -> Vec<usize> {
         let mut tape = Tape::recording(&parameters, &mut workspace).with_dropout(step);
         let total = network.losses(&mut tape, &batch, feed).unwrap().total;
         tape.backward(total, &mut gradients[0]).unwrap();
-        adam.step(&mut parameters, &mut gradients).unwrap();
+        adam.step(&mut parameters, &mut gradients, 1e-4).unwrap();
         LARGE_BYTES.load(Ordering::Relaxed) - before
     });
     steps.collect()

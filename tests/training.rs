@@ -56,6 +56,18 @@ fn weights_and_losses_are_the_same_to_the_bit_with_one_and_three_threads() {
 }
 
 #[test]
+fn the_learning_rate_rises_then_falls_to_its_final_share() {
+    let data = dataset();
+    let reports = train(&mut trainer(&data, 2), None, None);
+    let rates: Vec<f64> = reports.iter().map(|r| r.learning_rate).collect();
+    assert!((rates[0] - 0.01 / 3.0).abs() < 1e-15, "{rates:?}");
+    assert_eq!(rates[2..4], [0.01, 0.01]);
+    assert!(rates[3..].windows(2).all(|pair| pair[1] < pair[0]));
+    let last = rates[rates.len() - 1];
+    assert!((0.002..0.0021).contains(&last), "{last}");
+}
+
+#[test]
 fn both_feeds_are_drawn_and_the_loss_falls() {
     let data = dataset();
     let reports = train(&mut trainer(&data, 2), None, None);

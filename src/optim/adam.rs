@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::learning_rate::RateSchedule;
 use crate::autograd::kernels::vectorised;
 use crate::autograd::{Gradients, Parameters, Real};
 
@@ -22,6 +23,7 @@ const CHUNK: usize = 1 << 14;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AdamConfig {
+    /// The rate, or where it has a schedule the highest.
     pub learning_rate: f64,
     /// Decay of the mean of gradients.
     pub beta1: f64,
@@ -32,6 +34,19 @@ pub struct AdamConfig {
     /// Longest gradient over all parameters together; a longer one is scaled down to it. Left out: no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clip_norm: Option<f64>,
+    /// How the rate changes over the training. Left out: not at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_schedule: Option<RateSchedule>,
+}
+
+impl AdamConfig {
+    /// The learning rate at a step, counted from 0, of a training of `steps` steps.
+    pub fn learning_rate_at(&self, step: u64, steps: u64) -> f64 {
+        match self.rate_schedule {
+            None => self.learning_rate,
+            Some(schedule) => self.learning_rate * schedule.share(step, steps),
+        }
+    }
 }
 
 impl Default for AdamConfig {
@@ -42,6 +57,7 @@ impl Default for AdamConfig {
             beta2: 0.999,
             epsilon: 1e-8,
             clip_norm: None,
+            rate_schedule: None,
         }
     }
 }
@@ -119,7 +135,7 @@ impl<T: Real> Adam<T> {
         Ok(())
     }
 
-    /// One step with the sum of the shards' gradients, added in their order; leaves every gradient at zero. Returns the norm of
+    /// One step at `learning_rate` with the sum of the shards' gradients, added in their order; leaves every gradient at zero. Returns the norm of
     /// the sum over all parameters. Runs on rayon's current pool; the result does not depend on its threads.
     ///
     /// # Errors
@@ -131,13 +147,14 @@ impl<T: Real> Adam<T> {
         &mut self,
         parameters: &mut Parameters<T>,
         shards: &mut [Gradients<T>],
+        learning_rate: f64,
     ) -> Result<f64, NonFiniteGradient> {
         let Some((sum, rest)) = shards.split_first_mut() else {
             return Ok(0.0);
         };
         let norm = total_norm(parameters, add(sum, rest))?;
         self.steps += 1;
-        let factors = self.factors(norm);
+        let factors = self.factors(norm, learning_rate);
         let chunks: Vec<_> = parameters
             .values_mut()
             .zip(sum.iter_mut())
@@ -159,13 +176,13 @@ impl<T: Real> Adam<T> {
         Ok(norm)
     }
 
-    fn factors(&self, norm: f64) -> Factors<T> {
+    fn factors(&self, norm: f64, learning_rate: f64) -> Factors<T> {
         let AdamConfig {
-            learning_rate,
             beta1,
             beta2,
             epsilon,
             clip_norm,
+            ..
         } = self.config;
         let correction = |beta: f64| 1.0 - beta.powf(self.steps as f64);
         let clip = clip_norm.map_or(1.0, |limit| (limit / (norm + 1e-6)).min(1.0));
@@ -341,7 +358,8 @@ mod tests {
             // Two shards that add up to the gradient.
             let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
             let mut shards = [shard(0.25), shard(0.75)];
-            adam.step(&mut parameters, &mut shards).unwrap();
+            adam.step(&mut parameters, &mut shards, config.learning_rate)
+                .unwrap();
             assert!(
                 shards
                     .iter()
@@ -365,7 +383,7 @@ mod tests {
         let mut adam = Adam::new(AdamConfig::default(), &parameters);
         for _ in 0..5 {
             let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
-            adam.step(&mut parameters, &mut [gradients]).unwrap();
+            adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
         }
         let expected = [1.0 - 5e-4, 2.0 + 5e-4, 3.0 - 2.5e-4];
         for (w, expected) in weights(&parameters).into_iter().zip(expected) {
@@ -388,7 +406,7 @@ mod tests {
             let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
             let mut adam = Adam::new(config, &parameters);
             let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
-            let norm = adam.step(&mut parameters, &mut [gradients]).unwrap();
+            let norm = adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
             (norm, weights(&parameters))
         };
         let (norm, long) = run(clipped, 1.0);
@@ -411,7 +429,9 @@ mod tests {
                 &parameters,
                 |k, i| if (k, i) == (1, 17) { bad } else { 1e30 },
             );
-            let error = adam.step(&mut parameters, &mut [gradients]).unwrap_err();
+            let error = adam
+                .step(&mut parameters, &mut [gradients], 1e-4)
+                .unwrap_err();
             assert_eq!((error.parameter.as_str(), error.shape), ("p1", vec![20]));
         }
         assert_eq!((weights(&parameters), adam), before);
@@ -437,7 +457,7 @@ mod tests {
                 let mut shards: Vec<_> = (0..4)
                     .map(|s| gradients(&parameters, |_, i| ((i + s * 31 + t) as f64).cos()))
                     .collect();
-                pool.install(|| adam.step(&mut parameters, &mut shards))
+                pool.install(|| adam.step(&mut parameters, &mut shards, 1e-4))
                     .unwrap();
             }
             weights(&parameters)

@@ -1,5 +1,7 @@
-//! Optimisers.
+//! Optimisers, and the learning rate over a training.
 
 mod adam;
+mod learning_rate;
 
 pub use adam::{Adam, AdamConfig, NonFiniteGradient};
+pub use learning_rate::{RateSchedule, RateShape};

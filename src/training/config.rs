@@ -201,8 +201,19 @@ impl ExperimentConfig {
         check("optimiser.beta1", adam.beta1, is_beta(adam.beta1), beta)?;
         check("optimiser.beta2", adam.beta2, is_beta(adam.beta2), beta)?;
         positive("optimiser.epsilon", adam.epsilon)?;
-        adam.clip_norm
-            .map_or(Ok(()), |norm| positive("optimiser.clip_norm", norm))
+        if let Some(norm) = adam.clip_norm {
+            positive("optimiser.clip_norm", norm)?;
+        }
+        let Some(rate) = adam.rate_schedule else {
+            return Ok(());
+        };
+        let left = rate.final_share;
+        check(
+            "optimiser.rate_schedule.final_share",
+            left,
+            (0.0..=1.0).contains(&left),
+            || "at least 0 and at most 1".into(),
+        )
     }
 }
 

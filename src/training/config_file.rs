@@ -402,6 +402,17 @@ mod tests {
                 "optimiser.learning_rate=-1",
                 ["optimiser.learning_rate = -1", "above 0"],
             ),
+            (
+                "optimiser.rate_schedule.final_share=1.5",
+                [
+                    "optimiser.rate_schedule.final_share = 1.5",
+                    "at least 0 and at most 1",
+                ],
+            ),
+            (
+                "optimiser.rate_schedule.shape=step",
+                ["--set optimiser.rate_schedule.shape=step", "cosine"],
+            ),
             ("seed=-1", ["--set seed=-1", "-1"]),
             ("seed", ["--set seed", "no '='"]),
             ("a..b=1", ["--set a..b=1", "dotted key"]),

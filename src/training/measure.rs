@@ -28,6 +28,7 @@ pub struct MeasuredStep {
     adam: Adam<f32>,
     stepper: Stepper,
     plan: BatchPlan,
+    learning_rate: f64,
     done: u64,
 }
 
@@ -63,6 +64,7 @@ impl MeasuredStep {
                 length: frames,
                 windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
             },
+            learning_rate: config.optimiser.learning_rate,
             done: 0,
         })
     }
@@ -83,6 +85,7 @@ impl MeasuredStep {
             step: self.done,
             plan: &self.plan,
             feed: Feed::Predictions,
+            learning_rate: self.learning_rate,
         };
         let start = Instant::now();
         self.stepper

@@ -36,6 +36,7 @@ pub struct StepReport {
     /// Its terms by name, not weighted.
     #[serde(serialize_with = "by_name")]
     pub losses: Vec<(&'static str, f64)>,
+    pub learning_rate: f64,
     /// Norm of the gradient over all parameters, before any clipping.
     pub gradient_norm: f64,
     /// Frames predicted so far, this step's included.
@@ -92,6 +93,7 @@ pub(super) struct StepInput<'s> {
     pub step: u64,
     pub plan: &'s BatchPlan,
     pub feed: Feed,
+    pub learning_rate: f64,
 }
 
 /// Losses of a batch or of a shard of it.
@@ -197,7 +199,7 @@ impl Stepper {
         }
         let norm = self
             .pool
-            .install(|| adam.step(parameters, &mut self.gradients));
+            .install(|| adam.step(parameters, &mut self.gradients, input.learning_rate));
         match norm {
             Ok(norm) => Ok((sum, norm)),
             Err(error) => {

@@ -338,7 +338,12 @@ impl<'d> Trainer<'d> {
             step,
             plan,
             feed,
+            learning_rate: self
+                .config
+                .optimiser
+                .learning_rate_at(step, self.schedule.steps()),
         };
+        let learning_rate = input.learning_rate;
         let (losses, gradient_norm) =
             self.stepper
                 .step(&input, &mut self.parameters, &mut self.adam)?;
@@ -354,6 +359,7 @@ impl<'d> Trainer<'d> {
             beta,
             total: losses.total,
             losses: losses.terms,
+            learning_rate,
             gradient_norm,
             frame_steps: self.frame_steps,
             seconds,

@@ -6,6 +6,7 @@ use keydance::models::{Batch, Feed, LossTerms, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::motion::{Clip, Skeleton};
 use keydance::nn::Initialiser;
+use keydance::optim::RateSchedule;
 use keydance::training::{ExperimentConfig, Trainer, TrainingError};
 use ndarray::{Array2, Array3, Axis, s};
 
@@ -132,6 +133,11 @@ pub fn config() -> ExperimentConfig {
     config.schedule.batch_size = 13;
     config.schedule.fraction = 0.6;
     config.optimiser.learning_rate = 0.01;
+    config.optimiser.rate_schedule = Some(RateSchedule {
+        warmup_steps: 3,
+        final_share: 0.2,
+        ..RateSchedule::default()
+    });
     config.scheduled_sampling.decay = 0.7;
     config.checkpoint.every_steps = 10;
     config
