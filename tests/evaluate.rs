@@ -418,6 +418,70 @@ fn scores_of_different_data_are_not_set_side_by_side() {
 }
 
 #[test]
+fn clips_other_than_the_test_clips_are_named_in_the_json_and_have_files_of_their_own() {
+    let out = TempDir::new().unwrap();
+    let file = out.path().join("scores.json");
+    let scored = |clips: &str, share: &str| {
+        let mut command = evaluate(&FIXTURE.path("interpolation.toml"));
+        command.args(["--clips", clips, "--set"]);
+        command.arg(format!("data.validation_share={share}"));
+        command.arg("--out").arg(out.path().join("scores"));
+        command.arg("--json").arg(&file);
+        command
+    };
+    let of_validation = scored("validation", "0.25").assert().success();
+    of_validation.stdout(contains("on 1 validation clips, 180 frames"));
+    let scores = json(&file);
+    assert_eq!(scores["clips"], "validation");
+    assert!(scores["lrp"]["avg"].is_number());
+    let folder = out.path().join("scores");
+    assert_eq!(json(&folder.join("evaluation_validation.json")), scores);
+    let data = json(&folder.join("evaluation_validation_data.json"));
+    assert_eq!(
+        (&data["part"], &data["clips"]),
+        (&"validation".into(), &1.into())
+    );
+    // There are no scores on test clips for the tables, nor do they take others under that name.
+    let tables = || {
+        let mut command = keydance("tables");
+        command.arg(&folder);
+        command.arg("--out").arg(out.path().join("tables.md"));
+        command
+    };
+    let no_scores = tables().assert().failure();
+    no_scores.stderr(contains("has no evaluation.json"));
+    for name in ["evaluation", "evaluation_data"] {
+        let from = name.replace("evaluation", "evaluation_validation");
+        let renamed = folder.join(format!("{name}.json"));
+        fs::copy(folder.join(format!("{from}.json")), renamed).unwrap();
+    }
+    tables().assert().failure().stderr(contains("test clips"));
+    scored("train", "0.25")
+        .assert()
+        .success()
+        .stdout(contains("on 3 training clips, 540 frames"));
+    scored("validation", "0")
+        .assert()
+        .failure()
+        .stderr(contains("data.validation_share").and(contains("no validation clips")));
+}
+
+#[test]
+fn clips_that_a_run_was_trained_on_are_not_set_aside_afterwards_without_consent() {
+    let run = copied_run();
+    let asked = || {
+        let mut command = evaluate(run.path());
+        command.args(["--clips", "validation"]);
+        command.args(["--set", "data.validation_share=0.25"]);
+        command
+    };
+    let refused = asked().assert().failure();
+    refused
+        .stderr(contains("data.validation_share: 0.0, 0.25").and(contains("its training clips")));
+    asked().arg("--other-data").assert().success();
+}
+
+#[test]
 fn interpolation_on_the_dance_data_has_the_known_scores() {
     let Some(data) = real_data::dance_folder() else {
         return;

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 
-use super::evaluation_record::{EvaluatedData, EvaluationRecord, write_json};
+use super::clip_choice::ClipChoice;
+use super::evaluation_record::{EvaluatedData, EvaluationRecord};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::data::Dataset;
+use crate::data::{DataConfig, Dataset};
 use crate::evaluation::{Protocol, TableRow, terminal_tables};
 use crate::models::TransitionModel;
 use crate::training::{ExperimentConfig, RunFolder, replace_file};
@@ -19,10 +20,14 @@ pub struct EvaluateArgs {
     /// Folder of a run, or the config of a model that needs no training
     #[arg(value_name = "RUN_DIR_OR_CONFIG")]
     run: PathBuf,
-    /// Folder of BVH files; the config says which of them test
+    /// Folder of BVH files; the config says which of them train, validate and test
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Write the scores here, too; a run's folder gets them anyway, as evaluation.json
+    /// Which clips to score on
+    #[arg(long, value_enum, default_value_t)]
+    clips: ClipChoice,
+    /// Write the scores here, too; a run's folder gets them anyway, as evaluation.json (evaluation_validation.json,
+    /// evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
@@ -31,7 +36,7 @@ pub struct EvaluateArgs {
     /// Override a key of the config, such as data.split.share=0.8; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Evaluate on other data than the run was trained on
+    /// Evaluate on other data than the run was trained on, or split otherwise
     #[arg(long)]
     other_data: bool,
     #[command(flatten)]
@@ -47,15 +52,17 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         subject.check_data(&dataset, &args.data)?;
     }
     let mut out = std::io::stdout();
-    let data = EvaluatedData::of(&dataset);
+    let data = EvaluatedData::of(&dataset, args.clips)?;
     writeln!(
         out,
-        "{} on {} test clips, {} frames\n",
-        subject.what, data.test_clips, data.test_frames
+        "{} on {} {} clips, {} frames\n",
+        subject.what, data.clips, data.part, data.frames
     )?;
-    let outcome = args.threads.pool()?.install(|| {
-        evaluate_watched(&Protocol::default(), subject.model.as_ref(), &dataset.test)
-    })?;
+    let clips = args.clips.of(&dataset)?;
+    let outcome = args
+        .threads
+        .pool()?
+        .install(|| evaluate_watched(&Protocol::default(), subject.model.as_ref(), clips))?;
     for skipped in &outcome.skipped {
         eprintln!("warning: {skipped}");
     }
@@ -65,12 +72,15 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         schedule_note: String::new(),
     };
     write!(out, "{}", terminal_tables(&[row]))?;
+    let record = EvaluationRecord {
+        evaluation: outcome.evaluation,
+        data,
+    };
     if let Some(path) = &args.json {
-        write_json(path, &outcome.evaluation)?;
+        record.write_scores(path)?;
     }
     if let Some(folder) = subject.folder(args.out.as_deref())? {
-        let evaluation = outcome.evaluation;
-        EvaluationRecord { evaluation, data }.write(folder)?;
+        record.write(folder)?;
     }
     Ok(())
 }
@@ -141,8 +151,25 @@ impl Subject {
 
     /// Refuses data that the run was not trained on: its training clips may be test clips there.
     fn check_data(&self, dataset: &Dataset, folder: &Path) -> anyhow::Result<()> {
-        let manifest = self.run.as_ref().map(RunFolder::manifest).transpose()?;
-        if let Some(manifest) = manifest.flatten()
+        let Some(run) = &self.run else {
+            return Ok(());
+        };
+        let trained = run.config()?.data;
+        let parts = |data: &DataConfig| (data.split.clone(), data.validation_share);
+        if parts(&trained) != parts(&self.config.data) {
+            let config = |data| ExperimentConfig {
+                data,
+                ..ExperimentConfig::default()
+            };
+            let differences = config(trained).differences(&config(self.config.data.clone()))?;
+            anyhow::bail!(
+                "{} was trained on other clips of the data ({}; values there, values now), so some of these may be its training \
+                 clips; give --other-data to evaluate it on them all the same",
+                run.path().display(),
+                differences.join("; ")
+            );
+        }
+        if let Some(manifest) = run.manifest()?
             && manifest.data_digest != dataset.digest
         {
             anyhow::bail!(

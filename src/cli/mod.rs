@@ -4,6 +4,7 @@ mod bench_generate;
 mod bench_layers;
 mod bench_step;
 mod bvh;
+mod clip_choice;
 mod demo;
 mod evaluate;
 mod evaluation_record;

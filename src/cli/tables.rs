@@ -94,8 +94,8 @@ pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
 fn subject(data: &EvaluatedData) -> String {
     format!(
         "{} test clips, {} frames, of the data with digest {}",
-        data.test_clips,
-        thousands(data.test_frames as u64),
+        data.clips,
+        thousands(data.frames as u64),
         data.data_digest
     )
 }
@@ -109,22 +109,22 @@ fn same_data(runs: &[Evaluated]) -> anyhow::Result<()> {
             format!(
                 "{} on {} test clips ({} frames, windows by length {:?}) of data with digest {}",
                 run.folder.display(),
-                data.test_clips,
-                data.test_frames,
+                data.clips,
+                data.frames,
                 run.record.evaluation.windows,
                 data.data_digest
             )
         };
         let key = |run: &Evaluated| {
             let EvaluatedData {
-                test_clips,
-                test_frames,
+                clips,
+                frames,
                 data_digest,
                 ..
             } = run.record.data.clone();
             (
-                test_clips,
-                test_frames,
+                clips,
+                frames,
                 data_digest,
                 run.record.evaluation.windows.clone(),
             )

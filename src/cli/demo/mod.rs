@@ -14,6 +14,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use clap::Args;
 
+use super::clip_choice::ClipChoice;
 use super::evaluation_record::{EvaluatedData, EvaluationRecord, write_json};
 use super::tables::{schedule_note, thousands};
 use super::threads::Threads;
@@ -122,7 +123,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     write_json(&run.path().join(INTERPOLATION), &comparison.interpolation)?;
     EvaluationRecord {
         evaluation: comparison.model.clone(),
-        data: EvaluatedData::of(&dataset),
+        data: EvaluatedData::of(&dataset, ClipChoice::Test)?,
     }
     .write(run.path())?;
     write_text(
@@ -189,7 +190,9 @@ fn remove_results(folder: &Path) -> anyhow::Result<()> {
         INTERPOLATION,
         CHOREOGRAPHY,
     ];
-    let names = own.into_iter().chain(EvaluationRecord::FILES);
+    let names = own
+        .into_iter()
+        .chain(EvaluationRecord::files(ClipChoice::Test));
     for path in names.map(|name| folder.join(name)) {
         if path.exists() {
             fs::remove_file(&path)
