@@ -441,7 +441,7 @@ fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
     let digest = keydance::models::weights::digest(loaded.parameters());
     assert_eq!(digest, trainer.weights_digest());
     assert_eq!(
-        keydance::models::weights::digest(trainer.into_model().parameters()),
+        keydance::models::weights::digest(trainer.model().parameters()),
         digest
     );
 }

@@ -15,13 +15,13 @@ pub struct ParameterId(pub(super) usize);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockId(pub(super) usize);
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Parameter<T> {
     name: String,
     value: ArrayD<T>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Block<T> {
     parameter: usize,
     /// Numbers of the parameter that the block covers.
@@ -33,7 +33,7 @@ struct Block<T> {
 }
 
 /// Named weights. Shared read-only by the tapes of a step; changed between steps only.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Parameters<T> {
     parameters: Vec<Parameter<T>>,
     blocks: Vec<Block<T>>,

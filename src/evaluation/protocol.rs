@@ -23,6 +23,8 @@ pub struct Protocol {
     pub velocity_threshold: f64,
     /// delta_r of eq. 15, cm.
     pub root_threshold: f64,
+    /// At most this many windows of each length, spread evenly over all of them; none: all.
+    pub most_windows: Option<usize>,
     /// Windows that a model predicts in one call. Bounds memory.
     pub chunk: usize,
 }
@@ -33,6 +35,7 @@ impl Default for Protocol {
             lengths: vec![10, 50, 100, 150],
             velocity_threshold: 1.0,
             root_threshold: 7.0,
+            most_windows: None,
             chunk: 64,
         }
     }
@@ -141,7 +144,7 @@ impl Protocol {
             if length == 0 {
                 return Err(EvaluationError::ZeroLength);
             }
-            let cut = windows(&clip_frames, length);
+            let mut cut = windows(&clip_frames, length);
             if cut.windows.is_empty() {
                 return Err(EvaluationError::NoWindows {
                     length,
@@ -155,6 +158,9 @@ impl Protocol {
                 frames: clip_frames[clip],
                 length,
             }));
+            if let Some(most) = self.most_windows {
+                cut.windows = spread(&cut.windows, most);
+            }
             let measured = self.measure(model, clips, &cut.windows, length)?;
             let means = means(&measured, self.velocity_threshold, self.root_threshold);
             for (scores, mean) in scores.iter_mut().zip(means) {
@@ -188,6 +194,14 @@ impl Protocol {
             .collect::<Result<_, _>>()?;
         Ok(chunks.into_iter().flatten().collect())
     }
+}
+
+/// At most `most` of the windows, evenly spread over them.
+fn spread(windows: &[Window], most: usize) -> Vec<Window> {
+    let count = windows.len().min(most);
+    (0..count)
+        .map(|k| windows[k * windows.len() / count])
+        .collect()
 }
 
 fn measure_chunk(

@@ -1,6 +1,6 @@
 //! A network with its weights and statistics, as a model of transitions.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use ndarray::{Array2, Array3, s};
 
@@ -13,7 +13,7 @@ use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_F
 /// A trained network, in f32.
 pub struct TrainedModel {
     name: String,
-    network: Box<dyn Network<f32>>,
+    network: Arc<dyn Network<f32>>,
     parameters: Parameters<f32>,
     standardisation: Standardisation,
     workspaces: Mutex<Vec<Workspace<f32>>>,
@@ -23,13 +23,13 @@ impl TrainedModel {
     /// `parameters` are those that `network` was built with.
     pub fn new(
         name: String,
-        network: Box<dyn Network<f32>>,
+        network: impl Into<Arc<dyn Network<f32>>>,
         parameters: Parameters<f32>,
         standardisation: Standardisation,
     ) -> Self {
         Self {
             name,
-            network,
+            network: network.into(),
             parameters,
             standardisation,
             workspaces: Mutex::new(Vec::new()),

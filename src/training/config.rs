@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::validation::ValidationConfig;
 use crate::data::DataConfig;
 use crate::models::ModelConfig;
 use crate::optim::AdamConfig;
@@ -27,6 +28,9 @@ pub struct ExperimentConfig {
     pub scheduled_sampling: ScheduledSamplingConfig,
     pub checkpoint: CheckpointConfig,
     pub log: LogConfig,
+    /// Left out: a training does not score itself on validation clips.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation: Option<ValidationConfig>,
 }
 
 impl Default for ExperimentConfig {
@@ -41,6 +45,7 @@ impl Default for ExperimentConfig {
             scheduled_sampling: ScheduledSamplingConfig::default(),
             checkpoint: CheckpointConfig::default(),
             log: LogConfig::default(),
+            validation: None,
         }
     }
 }
@@ -189,6 +194,20 @@ impl ExperimentConfig {
         within("checkpoint.keep", self.checkpoint.keep, 1, 1000)?;
         let every = self.log.every_steps;
         check("log.every_steps", every, every > 0, || "at least 1".into())?;
+        if let Some(validation) = &self.validation {
+            let every = validation.every_steps;
+            check("validation.every_steps", every, every > 0, || {
+                "at least 1".into()
+            })?;
+            within("validation.windows", validation.windows, 1, LARGEST_BATCH)?;
+            let lengths = &validation.lengths;
+            check(
+                "validation.lengths",
+                format!("{lengths:?}"),
+                !lengths.is_empty() && lengths.iter().all(|n| (1..=LONGEST).contains(n)),
+                || format!("at least one length from 1 to {LONGEST}"),
+            )?;
+        }
         let adam = &self.optimiser;
         let positive = |key, x: f64| {
             check(key, x, x > 0.0 && x.is_finite(), || {

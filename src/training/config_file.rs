@@ -67,8 +67,22 @@ impl ExperimentConfig {
     /// A file cannot be read or is not TOML; a key is unknown or has a value of the wrong kind or range (the file or override
     /// that says so is named); a file is its own base.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
+        Self::load_under(path, None, sets)
+    }
+
+    /// The same with a budget between the file and `sets`: a file of overrides that any experiment can be under.
+    ///
+    /// # Errors
+    /// As [`ExperimentConfig::load`].
+    pub fn load_under(
+        path: &Path,
+        budget: Option<&Path>,
+        sets: &[String],
+    ) -> Result<Self, ConfigError> {
         let mut layers = Vec::new();
-        read_layers(path, &mut Vec::new(), &mut layers)?;
+        for file in [Some(path), budget].into_iter().flatten() {
+            read_layers(file, &mut Vec::new(), &mut layers)?;
+        }
         for set in sets {
             layers.push(set_layer(set)?);
         }
@@ -338,6 +352,29 @@ mod tests {
             (9, 2, 0.25)
         );
         assert_eq!(config.data.split, Split::Share(0.5));
+    }
+
+    #[test]
+    fn a_budget_overrides_the_file_and_the_command_line_both() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            fs::write(&path, text).unwrap();
+            path
+        };
+        let config = file(
+            "a.toml",
+            "name = 'a'\nschedule.fraction = 1\nschedule.max_len = 9",
+        );
+        let budget = file("b.toml", "schedule = { fraction = 0.5, batch_size = 16 }");
+        let set = "schedule.batch_size=32".to_string();
+        let schedule = ExperimentConfig::load_under(&config, Some(&budget), &[set])
+            .unwrap()
+            .schedule;
+        assert_eq!(
+            (schedule.max_len, schedule.fraction, schedule.batch_size),
+            (9, 0.5, 32)
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::config_file::ConfigError;
 use super::durable::FileError;
 use super::state::StateError;
 use crate::autograd::AutogradError;
+use crate::evaluation::EvaluationError;
 use crate::models::ModelError;
 use crate::models::weights::WeightsError;
 
@@ -55,6 +56,25 @@ pub enum TrainingError {
         length: usize,
         /// Operation and shapes.
         cause: String,
+    },
+    #[error("step {step} cannot be scored on the validation clips: {cause}")]
+    Validation {
+        step: u64,
+        cause: Box<EvaluationError>,
+    },
+    #[error(
+        "validation.every_steps needs validation clips; set some aside with data.validation_share, such as 0.1, or leave [validation] out"
+    )]
+    NoValidationClips,
+    #[error(
+        "{path} is locked: another process trains into this run; wait for it, or give another --out"
+    )]
+    Busy { path: PathBuf },
+    #[error("{path}, line {line}, is no line of a training's log: {cause}")]
+    Log {
+        path: PathBuf,
+        line: usize,
+        cause: serde_json::Error,
     },
     #[error(transparent)]
     File(#[from] FileError),

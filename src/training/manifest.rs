@@ -42,6 +42,9 @@ pub struct Manifest {
     pub steps: u64,
     pub frame_steps_done: u64,
     pub frame_steps: u64,
+    /// Frames that the whole schedule predicts, of which schedule.fraction takes `frame_steps`.
+    #[serde(default)]
+    pub whole_schedule_frame_steps: Option<u64>,
     pub train: Part,
     pub test: Part,
     pub data_digest: String,
@@ -91,6 +94,7 @@ impl Manifest {
             steps: schedule.steps(),
             frame_steps_done: 0,
             frame_steps: schedule.frame_steps(),
+            whole_schedule_frame_steps: Some(schedule.whole_frame_steps()),
             train: Part::of(&dataset.train),
             test: Part::of(&dataset.test),
             data_digest: dataset.digest.clone(),

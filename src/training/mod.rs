@@ -9,6 +9,7 @@ pub mod config;
 mod config_file;
 mod durable;
 mod error;
+mod log;
 pub mod manifest;
 pub mod measure;
 mod run_folder;
@@ -18,6 +19,7 @@ mod step;
 mod streams;
 mod trained_model;
 mod trainer;
+mod validation;
 
 pub use config::{
     CheckpointConfig, ExperimentConfig, LogConfig, ScheduleConfig, ScheduledSamplingConfig,
@@ -27,9 +29,11 @@ pub use config_file::ConfigError;
 pub use durable::FileError;
 pub(crate) use durable::replace as replace_file;
 pub use error::TrainingError;
+pub use log::LogLine;
 pub use manifest::{Manifest, RunState};
 pub use run_folder::RunFolder;
 pub use schedule::{BatchPlan, Schedule};
 pub use step::StepReport;
 pub use streams::Streams;
 pub use trainer::{Outcome, Resumed, Trainer};
+pub use validation::ValidationConfig;

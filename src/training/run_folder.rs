@@ -8,16 +8,14 @@
 //! weights.safetensors    the trained model, once finished
 //! ```
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::fs;
 use std::path::{Path, PathBuf};
-
-use serde::Deserialize;
 
 use super::checkpoint::{self, WEIGHTS_FILE};
 use super::config::ExperimentConfig;
 use super::durable::{self, FileError};
 use super::error::TrainingError;
+use super::log::{self, LogLine};
 use super::manifest::Manifest;
 use super::streams::Streams;
 use crate::autograd::Parameters;
@@ -119,6 +117,11 @@ impl RunFolder {
         self.path.join(CONFIG)
     }
 
+    /// The file of the manifest.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.path.join(MANIFEST)
+    }
+
     /// The resolved config.
     ///
     /// # Errors
@@ -151,12 +154,25 @@ impl RunFolder {
         ))
     }
 
+    /// The file of the log.
+    pub(super) fn log_path(&self) -> PathBuf {
+        self.path.join(LOG)
+    }
+
+    /// The lines of the log; none before the training has begun.
+    ///
+    /// # Errors
+    /// It cannot be read or holds something else.
+    pub fn log(&self) -> Result<Vec<LogLine>, TrainingError> {
+        log::read(&self.log_path())
+    }
+
     /// The manifest; none before the training has begun.
     ///
     /// # Errors
     /// It cannot be read or is none.
     pub fn manifest(&self) -> Result<Option<Manifest>, TrainingError> {
-        let path = self.path.join(MANIFEST);
+        let path = self.manifest_path();
         if !path.exists() {
             return Ok(None);
         }
@@ -168,7 +184,7 @@ impl RunFolder {
     }
 
     pub(super) fn write_manifest(&self, manifest: &Manifest) -> Result<(), TrainingError> {
-        let path = self.path.join(MANIFEST);
+        let path = self.manifest_path();
         let mut text =
             serde_json::to_vec_pretty(manifest).map_err(|cause| TrainingError::Manifest {
                 path: path.clone(),
@@ -180,60 +196,5 @@ impl RunFolder {
 
     pub(super) fn write_weights(&self, content: &[u8]) -> Result<(), FileError> {
         durable::replace(&self.weights(), content)
-    }
-}
-
-/// `log.jsonl`, open for more lines.
-pub(super) struct Log {
-    path: PathBuf,
-    file: File,
-}
-
-#[derive(Deserialize)]
-struct Line {
-    step: u64,
-}
-
-impl Log {
-    /// Opens a run's log and cuts it back to the lines of the first `steps` steps.
-    pub fn open(run: &RunFolder, steps: u64) -> Result<Self, FileError> {
-        let path = run.path.join(LOG);
-        let at = |action| FileError::at(&path, action);
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .read(true)
-            .open(&path)
-            .map_err(at("written"))?;
-        let mut reader = BufReader::new(&file);
-        let (mut kept, mut line) = (0, Vec::new());
-        loop {
-            line.clear();
-            let read = reader.read_until(b'\n', &mut line).map_err(at("read"))?;
-            let whole = line.ends_with(b"\n");
-            match serde_json::from_slice::<Line>(&line) {
-                Ok(Line { step }) if whole && step <= steps => kept += read as u64,
-                _ => break,
-            }
-        }
-        file.set_len(kept).map_err(at("written"))?;
-        Ok(Self { path, file })
-    }
-
-    /// Adds a line.
-    pub fn write(&mut self, report: &super::StepReport) -> Result<(), FileError> {
-        let line = serde_json::to_vec(report).map_err(std::io::Error::from);
-        line.and_then(|mut line| {
-            line.push(b'\n');
-            self.file.write_all(&line)
-        })
-        .map_err(FileError::at(&self.path, "written"))
-    }
-
-    /// Makes what was written last.
-    pub fn sync(&self) -> Result<(), FileError> {
-        self.file
-            .sync_data()
-            .map_err(FileError::at(&self.path, "written"))
     }
 }

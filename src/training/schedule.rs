@@ -36,6 +36,7 @@ pub struct Schedule {
     /// Steps before each epoch, and in all: one number more than epochs.
     first_steps: Vec<u64>,
     frame_steps: u64,
+    whole_frame_steps: u64,
     skipped_lengths: Vec<usize>,
     reference_steps: u64,
 }
@@ -53,6 +54,7 @@ impl Schedule {
             epochs: Vec::new(),
             first_steps: vec![0],
             frame_steps: 0,
+            whole_frame_steps: 0,
             skipped_lengths: Vec::new(),
             reference_steps: 0,
         };
@@ -83,6 +85,7 @@ impl Schedule {
                 let count = (all as f64 * config.fraction).floor() as usize - taken;
                 taken += count;
                 schedule.frame_steps += (count * length) as u64;
+                schedule.whole_frame_steps += (n * length) as u64;
                 schedule.reference_steps += n.div_ceil(REFERENCE_BATCH) as u64;
                 steps += count.div_ceil(schedule.batch_size) as u64;
                 if count > 0 {
@@ -104,9 +107,14 @@ impl Schedule {
         self.first_steps.last().copied().unwrap_or(0)
     }
 
-    /// Frames that the whole schedule predicts: N for each window.
+    /// Frames that the training predicts: N for each window.
     pub fn frame_steps(&self) -> u64 {
         self.frame_steps
+    }
+
+    /// Frames that it would predict with every window, whatever its fraction.
+    pub fn whole_frame_steps(&self) -> u64 {
+        self.whole_frame_steps
     }
 
     /// Lengths that no training clip is long enough for.
@@ -288,6 +296,8 @@ mod tests {
                 }
                 batches.iter().flatten().map(|b| b.windows.len()).sum::<usize>()
             };
+            let all = |config: &ScheduleConfig| schedule(&frames, config, 5).whole_frame_steps();
+            prop_assert_eq!(all(&part), schedule(&frames, &config, 5).frame_steps());
             let (whole, part) = (trained(&config), trained(&part));
             prop_assert_eq!(part, (whole as f64 * fraction).floor() as usize);
         }

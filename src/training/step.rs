@@ -12,6 +12,7 @@ use super::schedule::{BatchPlan, parts};
 use super::streams::Streams;
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::{Standardisation, Window, window_features};
+use crate::evaluation::Evaluation;
 use crate::models::{Batch, Feed, Network};
 use crate::motion::features::FEATURES;
 use crate::optim::Adam;
@@ -44,6 +45,9 @@ pub struct StepReport {
     /// Wall-clock time of the step.
     pub seconds: f64,
     pub frame_steps_per_second: f64,
+    /// Scores on validation clips after the step, where it was scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Evaluation>,
 }
 
 fn feed_name<S: Serializer>(feed: &Feed, serializer: S) -> Result<S::Ok, S::Error> {
@@ -126,6 +130,11 @@ impl Stepper {
             workspaces: Mutex::new(Vec::new()),
             gradients: vec![Gradients::zeros(parameters); shards],
         })
+    }
+
+    /// Runs something else on the threads of the steps.
+    pub fn install<R: Send>(&self, run: impl FnOnce() -> R + Send) -> R {
+        self.pool.install(run)
     }
 
     /// Computes the batch and moves the weights. Returns the losses before the move, and the norm of the gradient.

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use rand::RngExt as _;
@@ -10,8 +11,9 @@ use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::config::ExperimentConfig;
 use super::config_file::ConfigError;
 use super::error::TrainingError;
+use super::log::Log;
 use super::manifest::{self, Manifest, RunState};
-use super::run_folder::{Log, RunFolder};
+use super::run_folder::RunFolder;
 use super::schedule::{BatchPlan, Schedule};
 use super::state::{self, Header};
 use super::step::{StepInput, StepReport, Stepper, TrainingWindows};
@@ -35,7 +37,7 @@ pub struct Trainer<'d> {
     windows: TrainingWindows<'d>,
     streams: Streams,
     schedule: Schedule,
-    network: Box<dyn Network<f32>>,
+    network: Arc<dyn Network<f32>>,
     parameters: Parameters<f32>,
     adam: Adam<f32>,
     stepper: Stepper,
@@ -109,9 +111,12 @@ impl<'d> Trainer<'d> {
                 longest: frames.iter().copied().max().unwrap_or(0),
             });
         }
+        if config.validation.is_some() && dataset.validation.is_empty() {
+            return Err(TrainingError::NoValidationClips);
+        }
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
-        let network = build(&mut init, &standardisation)?;
+        let network = build(&mut init, &standardisation)?.into();
         Ok(Self {
             config_digest: checkpoint::file_digest(config_toml.as_bytes()),
             config_toml,
@@ -177,12 +182,12 @@ impl<'d> Trainer<'d> {
     }
 
     /// The model with the weights as they are.
-    pub fn into_model(self) -> TrainedModel {
+    pub fn model(&self) -> TrainedModel {
         TrainedModel::new(
-            self.config.name,
-            self.network,
-            self.parameters,
-            self.windows.standardisation,
+            self.config.name.clone(),
+            self.network.clone(),
+            self.parameters.clone(),
+            self.windows.standardisation.clone(),
         )
     }
 
@@ -232,7 +237,11 @@ impl<'d> Trainer<'d> {
             data_digest,
             ..
         } = checkpoint.header;
-        if config_digest != self.config_digest {
+        // Another version may write the same config with more keys.
+        if config_digest != self.config_digest
+            && ExperimentConfig::parse(&checkpoint.weights.config, "the checkpoint's config")?
+                != self.config
+        {
             return Err(TrainingError::OtherRun {
                 path: path.into(),
                 saved: config_digest,
@@ -289,7 +298,7 @@ impl<'d> Trainer<'d> {
         for epoch in first..self.schedule.epochs() {
             let batches = self.schedule.epoch(epoch);
             for plan in batches.iter().skip(std::mem::take(&mut position)) {
-                let report = match self.step(epoch, plan) {
+                let report = match self.step(epoch, plan).and_then(|step| self.score(step)) {
                     Ok(report) => report,
                     Err(error) => {
                         if let (TrainingError::NonFinite { .. }, Some(record)) =
@@ -364,7 +373,26 @@ impl<'d> Trainer<'d> {
             frame_steps: self.frame_steps,
             seconds,
             frame_steps_per_second: frames as f64 / seconds.max(1e-9),
+            validation: None,
         })
+    }
+
+    /// Scores the weights as they are on the validation clips where it is time to.
+    fn score(&self, mut report: StepReport) -> Result<StepReport, TrainingError> {
+        let last = report.step == self.schedule.steps();
+        if let Some(validation) = &self.config.validation
+            && (report.step.is_multiple_of(validation.every_steps) || last)
+        {
+            let model = self.model();
+            let scores = self
+                .stepper
+                .install(|| validation.score(&model, self.dataset));
+            report.validation = Some(scores.map_err(|cause| TrainingError::Validation {
+                step: report.step,
+                cause: Box::new(cause),
+            })?);
+        }
+        Ok(report)
     }
 
     /// The content of a state file that belongs to a weights file.
@@ -412,7 +440,7 @@ impl<'r> Record<'r> {
         }
         let mut record = Self {
             run,
-            log: Log::open(run, trainer.steps_done())?,
+            log: Log::open(run.log_path(), trainer.steps_done())?,
             manifest,
             seconds_before,
             start: Instant::now(),
@@ -425,7 +453,8 @@ impl<'r> Record<'r> {
     fn step(&mut self, trainer: &Trainer<'_>, report: &StepReport) -> Result<(), TrainingError> {
         let config = &trainer.config;
         let last = report.step == trainer.schedule.steps();
-        if report.step.is_multiple_of(config.log.every_steps) || last {
+        if report.step.is_multiple_of(config.log.every_steps) || last || report.validation.is_some()
+        {
             self.log.write(report)?;
         }
         if report.step.is_multiple_of(config.checkpoint.every_steps) {

@@ -1,0 +1,107 @@
+//! `log.jsonl`: a line for every step that is logged.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::durable::FileError;
+use super::error::TrainingError;
+use super::step::StepReport;
+use crate::evaluation::Evaluation;
+
+/// What figures need of a line.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct LogLine {
+    pub step: u64,
+    /// Frames predicted so far.
+    pub frame_steps: u64,
+    pub total: f64,
+    pub losses: BTreeMap<String, f64>,
+    /// Scores on validation clips after the step, where it was scored.
+    #[serde(default)]
+    pub validation: Option<Evaluation>,
+}
+
+/// The lines of a log; none where there is none. A last line that a kill cut off is left out.
+///
+/// # Errors
+/// The file cannot be read, or a line of it is no log line.
+pub(super) fn read(path: &Path) -> Result<Vec<LogLine>, TrainingError> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text = std::fs::read_to_string(path).map_err(FileError::at(path, "read"))?;
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    let parse = |(index, line)| {
+        serde_json::from_str(line).map_err(|cause| TrainingError::Log {
+            path: path.into(),
+            line: index + 1,
+            cause,
+        })
+    };
+    whole.lines().enumerate().map(parse).collect()
+}
+
+/// A log, open for more lines and locked: two trainings do not write into one run.
+pub(super) struct Log {
+    path: PathBuf,
+    file: File,
+}
+
+#[derive(Deserialize)]
+struct Line {
+    step: u64,
+}
+
+impl Log {
+    /// Opens a run's log and cuts it back to the lines of the first `steps` steps.
+    ///
+    /// # Errors
+    /// Another process trains into the run, or the file cannot be read or written.
+    pub fn open(path: PathBuf, steps: u64) -> Result<Self, TrainingError> {
+        let at = |action| FileError::at(&path, action);
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .read(true)
+            .open(&path)
+            .map_err(at("written"))?;
+        // A file system without locks is no reason not to train.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(TrainingError::Busy { path });
+        }
+        let mut reader = BufReader::new(&file);
+        let (mut kept, mut line) = (0, Vec::new());
+        loop {
+            line.clear();
+            let read = reader.read_until(b'\n', &mut line).map_err(at("read"))?;
+            let whole = line.ends_with(b"\n");
+            match serde_json::from_slice::<Line>(&line) {
+                Ok(Line { step }) if whole && step <= steps => kept += read as u64,
+                _ => break,
+            }
+        }
+        file.set_len(kept).map_err(at("written"))?;
+        Ok(Self { path, file })
+    }
+
+    /// Adds a line.
+    pub fn write(&mut self, report: &StepReport) -> Result<(), FileError> {
+        let line = serde_json::to_vec(report).map_err(std::io::Error::from);
+        line.and_then(|mut line| {
+            line.push(b'\n');
+            self.file.write_all(&line)
+        })
+        .map_err(FileError::at(&self.path, "written"))
+    }
+
+    /// Makes what was written last.
+    pub fn sync(&self) -> Result<(), FileError> {
+        self.file
+            .sync_data()
+            .map_err(FileError::at(&self.path, "written"))
+    }
+}
