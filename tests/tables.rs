@@ -17,7 +17,8 @@ fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> Ta
     let shares = vec![share; lengths.len()];
     TableRow {
         name: name.into(),
-        evaluation: Evaluation {
+        seed: None,
+        evaluation: Some(Evaluation {
             lrp: scores(lrp),
             avf: scores(&shares),
             art: scores(&shares),
@@ -25,7 +26,7 @@ fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> Ta
                 .iter()
                 .map(|&length| (length, 1000 / length))
                 .collect(),
-        },
+        }),
         schedule_note: note.into(),
     }
 }
@@ -185,6 +186,64 @@ fn runs_of_one_model_and_models_of_our_own_are_all_there() {
         ["paper", "ours (1)", "difference", "ours (2)", "difference"]
     );
     assert_eq!(lines(&lrp, "preferred")[0][1..3], ["ours", "3.00"]);
+}
+
+#[test]
+fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
+    let seeded = |seed, lrp: [f64; 4]| TableRow {
+        seed: Some(seed),
+        ..row("whole_model", &paper::LENGTHS, &lrp, 0.5, "short")
+    };
+    let mut rows = vec![
+        seeded(1, [30.0, 50.0, 60.0, 70.0]),
+        seeded(2, [31.0, 50.0, 60.0, 70.0]),
+        seeded(3, [35.0, 50.0, 60.0, 70.0]),
+    ];
+    let [lrp, ..] = tables(&rows);
+    let found = lines(&lrp, "Whole model");
+    let expected = [
+        ["paper", "27.07"],
+        ["ours, seed 1", "30.00"],
+        ["ours, seed 2", "31.00"],
+        ["ours, seed 3", "35.00"],
+        ["ours, mean ± sd", "32.00 ± 2.65"],
+        ["ours, min to max", "30.00 to 35.00"],
+        ["difference of the mean", "+4.93"],
+    ];
+    for (found, expected) in found.iter().zip(expected) {
+        assert_eq!(found[1..3], expected);
+    }
+    assert_eq!(found[4][3], "50.00 ± 0.00");
+    let note = "- Whole model (seed 1), Whole model (seed 2), Whole model (seed 3): short";
+    assert!(lrp.contains(note), "{lrp}");
+    // A seed that is still missing leaves its line, and the spread of the others.
+    rows[1].evaluation = None;
+    rows[1].schedule_note = "not trained yet".into();
+    let [lrp, ..] = tables(&rows);
+    let found = lines(&lrp, "Whole model");
+    assert_eq!(found[2][1..3], ["ours, seed 2", "—"]);
+    assert_eq!(found[4][2], "32.50 ± 3.54");
+}
+
+#[test]
+fn a_model_that_is_not_trained_yet_keeps_its_row() {
+    let absent = TableRow {
+        evaluation: None,
+        ..row(
+            "condition_fc",
+            &paper::LENGTHS,
+            &[0.0; 4],
+            0.5,
+            "not trained yet",
+        )
+    };
+    let [lrp, avf, _] = tables(&[absent]);
+    for table in [&lrp, &avf] {
+        let found = lines(table, "Condition-FC");
+        assert_eq!(found[1][1..3], ["ours", "—"]);
+        assert_eq!(found[2][1..3], ["difference", "—"]);
+        assert!(table.contains("- Condition-FC: not trained yet"), "{table}");
+    }
 }
 
 #[test]

@@ -68,7 +68,8 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     }
     let row = TableRow {
         name: subject.config.name.clone(),
-        evaluation: outcome.evaluation.clone(),
+        seed: None,
+        evaluation: Some(outcome.evaluation.clone()),
         schedule_note: String::new(),
     };
     write!(out, "{}", terminal_tables(&[row]))?;

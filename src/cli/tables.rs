@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::evaluation_record::{EvaluatedData, EvaluationRecord};
-use crate::evaluation::{TableRow, markdown_tables, paper};
+use crate::evaluation::{TableRow, markdown_tables};
+use crate::optim::{AdamConfig, RateShape};
 use crate::training::{ExperimentConfig, Manifest, RunFolder, RunState, replace_file};
 
 #[derive(Debug, Args)]
@@ -61,25 +62,35 @@ impl Evaluated {
     fn row(&self) -> TableRow {
         TableRow {
             name: self.config.name.clone(),
-            evaluation: self.record.evaluation.clone(),
+            seed: self.manifest.as_ref().map(|manifest| manifest.seed),
+            evaluation: Some(self.record.evaluation.clone()),
             schedule_note: self.manifest.as_ref().map_or_else(
-                || "needs no training".into(),
+                || NO_TRAINING.into(),
                 |manifest| schedule_note(&self.config, manifest),
             ),
         }
     }
 }
 
-/// The budget of a training and its seed, for a caption.
+/// The note of a model that has no weights.
+pub const NO_TRAINING: &str = "needs no training";
+
+/// The budget of a training, for a caption; all but the seed.
 pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
     let done = manifest.frame_steps_done;
-    let mut note = format!(
-        "schedule.fraction {}, {} frame-steps ({:.3} % of the paper's {:.1e}), seed {}",
+    let mut note = format!("{} frame-steps", thousands(done));
+    if let Some(whole) = manifest.whole_schedule_frame_steps {
+        note += &format!(
+            " ({:.3} % of the whole schedule's {})",
+            100.0 * done as f64 / whole as f64,
+            thousands(whole)
+        );
+    }
+    note += &format!(
+        ", schedule.fraction {}, batch size {}, {}",
         config.schedule.fraction,
-        thousands(done),
-        100.0 * done as f64 / paper::FRAME_STEPS,
-        paper::FRAME_STEPS,
-        manifest.seed
+        config.schedule.batch_size,
+        learning_rate(&config.optimiser)
     );
     if manifest.state != RunState::Finished {
         note += &format!(
@@ -90,8 +101,25 @@ pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
     note
 }
 
+fn learning_rate(optimiser: &AdamConfig) -> String {
+    let rate = optimiser.learning_rate;
+    let Some(schedule) = optimiser.rate_schedule else {
+        return format!("learning rate {rate}");
+    };
+    let mut text = format!("learning rate {rate}");
+    if schedule.warmup_steps > 0 {
+        text += &format!(" after {} steps of warm-up", schedule.warmup_steps);
+    }
+    let shape = match schedule.shape {
+        RateShape::Constant => return text,
+        RateShape::Linear => "linearly",
+        RateShape::Cosine => "as a cosine",
+    };
+    text + &format!(", falling {shape} to {}", rate * schedule.final_share)
+}
+
 /// What the scores were measured on, for a caption.
-fn subject(data: &EvaluatedData) -> String {
+pub fn subject(data: &EvaluatedData) -> String {
     format!(
         "{} test clips, {} frames, of the data with digest {}",
         data.clips,

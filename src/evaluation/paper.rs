@@ -3,10 +3,6 @@
 /// The transition lengths of the paper's tables, frames.
 pub const LENGTHS: [usize; 4] = [10, 50, 100, 150];
 
-/// Frames that the paper's whole schedule predicts in training: windows of every length of every epoch of the dance data's training
-/// clips, N for each window.
-pub const FRAME_STEPS: f64 = 6.1e8;
-
 /// One model's row in the paper's tables: the score at each of [`LENGTHS`], then AVG.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRow {

@@ -10,11 +10,17 @@ use super::scores::{Evaluation, LengthScores};
 pub struct TableRow {
     /// The model's name in its config, such as `whole_model`; finds the paper's row.
     pub name: String,
-    pub evaluation: Evaluation,
+    /// The seed of its training. Rows that differ in it only are shown with their mean and spread.
+    pub seed: Option<u64>,
+    /// None where it is not trained yet: the row stands there all the same.
+    pub evaluation: Option<Evaluation>,
     /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6 frame-steps"; "not trained" for
     /// interpolation.
     pub schedule_note: String,
 }
+
+/// The cell of a model that has no scores yet.
+const ABSENT: &str = "—";
 
 /// One of the three scores: how it is called, measured and printed.
 struct Score {
@@ -55,7 +61,8 @@ const SCORES: [Score; 3] = [
 
 /// Tables 2, 3 and 4 in Markdown: for each model the paper's value, ours and the difference (ours minus the paper's).
 ///
-/// All rows of the paper are there, in its order, then our models that it does not have. `subject` says in the caption what ours were
+/// All rows of the paper are there, in its order, then our models that it does not have. Rows of one model that differ in their seed
+/// only have their mean, standard deviation and range too; a row without scores has "—" in every cell. `subject` says in the caption what ours were
 /// evaluated on, such as "25 test clips of the dance data set". Where our lengths are not the paper's four, the columns
 /// are ours and AVG is not compared.
 pub fn markdown_tables(rows: &[TableRow], subject: &str) -> String {
@@ -78,25 +85,8 @@ fn markdown_table(score: &Score, rows: &[TableRow], subject: &str) -> String {
     for group in groups(rows) {
         let paper = group.paper.and_then(score.paper);
         let paper = paper.map(|values| paper_values(&values, &lengths));
-        let mut entries = Vec::new();
-        if let Some(paper) = &paper {
-            entries.push(("paper".to_string(), cells(paper, false)));
-        }
-        for (index, row) in group.ours.iter().enumerate() {
-            let ours = our_values((score.ours)(&row.evaluation), &lengths);
-            let kind = match group.ours.len() {
-                1 => "ours".to_string(),
-                _ => format!("ours ({})", index + 1),
-            };
-            entries.push((kind, cells(&ours, false)));
-            if let Some(paper) = &paper {
-                let same_lengths = row.evaluation.lrp.lengths().eq(paper::LENGTHS);
-                let difference = difference(&ours, paper, same_lengths);
-                entries.push(("difference".to_string(), cells(&difference, true)));
-            }
-        }
-        let mut title = group.title;
-        for (kind, cells) in entries {
+        let mut title = group.title.clone();
+        for (kind, cells) in group_lines(&group, score, paper.as_deref(), &lengths) {
             let mut line = vec![std::mem::take(&mut title), kind];
             line.extend(cells);
             lines.push(line);
@@ -114,12 +104,137 @@ fn markdown_table(score: &Score, rows: &[TableRow], subject: &str) -> String {
     if !rows.is_empty() {
         out += "\nTraining of ours:\n\n";
     }
-    for group in groups(rows) {
-        for row in group.ours {
-            out += &format!("- {}: {}\n", group.title, row.schedule_note);
-        }
+    for (note, models) in notes(rows) {
+        out += &format!("- {}: {note}\n", models.join(", "));
     }
     out
+}
+
+/// The lines of one model: what each shows, and its cells.
+fn group_lines(
+    group: &Group<'_>,
+    score: &Score,
+    paper: Option<&[Option<f64>]>,
+    lengths: &[usize],
+) -> Vec<(String, Vec<String>)> {
+    let mut lines = Vec::new();
+    if let Some(paper) = paper {
+        lines.push(("paper".to_string(), cells(paper, false)));
+    }
+    let compared = |ours: &[Option<f64>], of: &TableRow| {
+        let same_lengths = of
+            .evaluation
+            .as_ref()
+            .is_some_and(|evaluation| evaluation.lrp.lengths().eq(paper::LENGTHS));
+        paper.map(|paper| cells(&difference(ours, paper, same_lengths), true))
+    };
+    let values = |row: &TableRow| {
+        row.evaluation
+            .as_ref()
+            .map(|evaluation| our_values((score.ours)(evaluation), lengths))
+    };
+    let absent = || vec![ABSENT.to_string(); lengths.len() + 1];
+    let by_seed = group.differ_in_seed_only();
+    for (index, row) in group.ours.iter().enumerate() {
+        let kind = match row.seed {
+            Some(seed) if by_seed => format!("ours, seed {seed}"),
+            _ if group.ours.len() > 1 => format!("ours ({})", index + 1),
+            _ => "ours".to_string(),
+        };
+        let ours = values(row);
+        let shown = ours.as_ref().map(|ours| cells(ours, false));
+        lines.push((kind, shown.unwrap_or_else(absent)));
+        if paper.is_some() && !by_seed {
+            let difference = ours.and_then(|ours| compared(&ours, row));
+            lines.push(("difference".into(), difference.unwrap_or_else(absent)));
+        }
+    }
+    if by_seed {
+        let measured: Vec<(&TableRow, Vec<Option<f64>>)> = group
+            .ours
+            .iter()
+            .filter_map(|row| Some((*row, values(row)?)))
+            .collect();
+        let columns: Vec<Option<Spread>> = (0..=lengths.len())
+            .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
+            .collect();
+        let shown = |text: &dyn Fn(&Spread) -> String| -> Vec<String> {
+            let cell = |spread: &Option<Spread>| spread.as_ref().map(text);
+            columns
+                .iter()
+                .map(|spread| cell(spread).unwrap_or(ABSENT.into()))
+                .collect()
+        };
+        lines.push((
+            "ours, mean ± sd".into(),
+            shown(&|s| format!("{:.2} ± {:.2}", s.mean, s.deviation)),
+        ));
+        lines.push((
+            "ours, min to max".into(),
+            shown(&|s| format!("{:.2} to {:.2}", s.least, s.most)),
+        ));
+        if paper.is_some() {
+            let means: Vec<Option<f64>> = columns
+                .iter()
+                .map(|spread| spread.as_ref().map(|spread| spread.mean))
+                .collect();
+            let difference = measured
+                .first()
+                .and_then(|(row, _)| compared(&means, row))
+                .unwrap_or_else(absent);
+            lines.push(("difference of the mean".into(), difference));
+        }
+    }
+    lines
+}
+
+/// Every note of the rows once, and the models that it is about.
+fn notes(rows: &[TableRow]) -> Vec<(&str, Vec<String>)> {
+    let mut notes: Vec<(&str, Vec<String>)> = Vec::new();
+    for group in groups(rows) {
+        for row in group.ours {
+            let model = match row.seed {
+                Some(seed) => format!("{} (seed {seed})", group.title),
+                None => group.title.clone(),
+            };
+            match notes
+                .iter_mut()
+                .find(|(note, _)| *note == row.schedule_note)
+            {
+                Some((_, models)) => models.push(model),
+                None => notes.push((&row.schedule_note, vec![model])),
+            }
+        }
+    }
+    notes
+}
+
+/// The scores of several seeds at one length.
+struct Spread {
+    mean: f64,
+    /// Standard deviation with n - 1; 0 for one seed.
+    deviation: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Spread {
+    /// None where a seed has no score.
+    fn of(scores: impl Iterator<Item = Option<f64>>) -> Option<Self> {
+        let scores: Vec<f64> = scores.collect::<Option<_>>()?;
+        if scores.is_empty() {
+            return None;
+        }
+        let count = scores.len() as f64;
+        let mean = scores.iter().sum::<f64>() / count;
+        let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
+        Some(Self {
+            mean,
+            deviation: (squares / (count - 1.0).max(1.0)).sqrt(),
+            least: scores.iter().copied().fold(f64::INFINITY, f64::min),
+            most: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        })
+    }
 }
 
 /// The scores as plain text, for the terminal: a block for each score, a line for each model, at last the numbers of windows.
@@ -135,11 +250,15 @@ pub fn terminal_tables(rows: &[TableRow]) -> String {
     };
     let mut header: Vec<String> = lengths.iter().map(usize::to_string).collect();
     header.push("AVG".into());
+    let measured: Vec<(&TableRow, &Evaluation)> = rows
+        .iter()
+        .filter_map(|row| Some((row, row.evaluation.as_ref()?)))
+        .collect();
     let mut out = String::new();
     for score in &SCORES {
         out += &line(&format!("{} ({})", score.name, score.unit), &header);
-        for row in rows {
-            let ours = our_values((score.ours)(&row.evaluation), &lengths);
+        for (row, evaluation) in &measured {
+            let ours = our_values((score.ours)(evaluation), &lengths);
             out += &line(&row.name, &cells(&ours, false));
             let paper = paper::row(&row.name).and_then(score.paper);
             if let Some(values) = paper.filter(|_| lengths == paper::LENGTHS) {
@@ -148,10 +267,10 @@ pub fn terminal_tables(rows: &[TableRow]) -> String {
         }
         out.push('\n');
     }
-    for row in rows {
+    for (row, evaluation) in &measured {
         let counts: Vec<String> = lengths
             .iter()
-            .map(|length| row.evaluation.windows.get(length))
+            .map(|length| evaluation.windows.get(length))
             .map(|count| count.map_or("-".into(), usize::to_string))
             .collect();
         out += &line(&format!("windows, {}", row.name), &counts);
@@ -163,7 +282,8 @@ pub fn terminal_tables(rows: &[TableRow]) -> String {
 fn lengths(rows: &[TableRow]) -> Vec<usize> {
     let lengths: BTreeSet<usize> = rows
         .iter()
-        .flat_map(|row| row.evaluation.lrp.lengths())
+        .filter_map(|row| row.evaluation.as_ref())
+        .flat_map(|evaluation| evaluation.lrp.lengths())
         .collect();
     if lengths.is_empty() {
         return paper::LENGTHS.to_vec();
@@ -176,6 +296,22 @@ struct Group<'a> {
     title: String,
     paper: Option<&'static PaperRow>,
     ours: Vec<&'a TableRow>,
+}
+
+impl Group<'_> {
+    /// Whether these are trainings of one model on one budget with several seeds.
+    fn differ_in_seed_only(&self) -> bool {
+        let Some((first, others)) = self.ours.split_first() else {
+            return false;
+        };
+        let seeds: BTreeSet<_> = self.ours.iter().filter_map(|row| row.seed).collect();
+        // A row that is not trained yet has no note of its budget.
+        let measured = |row: &TableRow| row.evaluation.is_some();
+        let same = |row: &&TableRow| {
+            !measured(first) || !measured(row) || row.schedule_note == first.schedule_note
+        };
+        !others.is_empty() && seeds.len() == self.ours.len() && others.iter().all(same)
+    }
 }
 
 fn groups(rows: &[TableRow]) -> Vec<Group<'_>> {

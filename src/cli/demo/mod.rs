@@ -97,19 +97,22 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
         model: evaluate(&model)?,
     };
     let manifest = run.manifest()?.context("the training left no manifest")?;
-    let row = |name: &str, evaluation: &Evaluation, schedule_note: String| TableRow {
+    let row = |name: &str, seed, evaluation: &Evaluation, schedule_note: String| TableRow {
         name: name.into(),
-        evaluation: evaluation.clone(),
+        seed,
+        evaluation: Some(evaluation.clone()),
         schedule_note,
     };
     let rows = [
         row(
             "interpolation, generated clips",
+            None,
             &comparison.interpolation,
             "needs no training".into(),
         ),
         row(
             "small whole model, generated clips",
+            Some(manifest.seed),
             &comparison.model,
             schedule_note(config, &manifest),
         ),
