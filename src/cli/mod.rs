@@ -12,6 +12,8 @@ mod export_batch;
 mod features;
 mod gradcheck;
 mod progress;
+mod reproduce;
+mod stop;
 mod tables;
 mod threads;
 mod train;
@@ -55,6 +57,8 @@ enum Command {
     Train(train::TrainArgs),
     /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
     Evaluate(evaluate::EvaluateArgs),
+    /// Train and evaluate every config of a folder, and write tables, figures and a manifest
+    Reproduce(reproduce::ReproduceArgs),
     /// Set scores beside the paper's in its tables 2 to 4
     Tables(tables::TablesArgs),
 }
@@ -76,6 +80,7 @@ impl Cli {
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => evaluate::run(args)?,
+            Command::Reproduce(args) => return reproduce::run(args),
             Command::Tables(args) => tables::run(args)?,
         }
         Ok(ExitCode::SUCCESS)

@@ -4,19 +4,14 @@ use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::progress::Progress;
+use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use crate::data::Dataset;
-use crate::training::{ExperimentConfig, Outcome, RunFolder, Trainer};
-
-/// Exit code after Ctrl-C or SIGTERM, as shells have it.
-const INTERRUPTED: u8 = 130;
+use crate::training::{ExperimentConfig, Outcome, RunFolder, Trainer, TrainingError};
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -28,6 +23,9 @@ pub struct TrainArgs {
     /// Folder for the run: config, manifest, log, checkpoints, weights
     #[arg(long, value_name = "RUN_DIR")]
     out: PathBuf,
+    /// Config of overrides over the experiment's, such as experiments/budget/two_cores.toml
+    #[arg(long, value_name = "FILE")]
+    budget: Option<PathBuf>,
     /// Override a key of the config, such as schedule.fraction=0.005; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -41,7 +39,7 @@ pub struct TrainArgs {
 /// # Errors
 /// The config, the data or the run's folder cannot be used; the training diverged.
 pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
-    let config = ExperimentConfig::load(&args.config, &args.set)?;
+    let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
     let mut out = std::io::stdout();
     writeln!(out, "{}", config.to_toml()?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
@@ -49,28 +47,11 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
     describe(&trainer, threads)?;
     let run = if args.resume {
-        let run = RunFolder::resume(&args.out, &config)?;
-        let resumed = trainer.resume(&run)?;
-        for problem in &resumed.damaged {
-            eprintln!("warning: a newer checkpoint is left out: {problem}");
-        }
-        writeln!(out, "goes on after step {}", resumed.steps)?;
-        run
+        resume(&mut trainer, &args.out, &config)?
     } else {
         RunFolder::create(&args.out, &config)?
     };
-    let stop = stop_on_signal()?;
-    let mut progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
-    let outcome = trainer.run(Some(&run), &mut |report| {
-        progress.step(report);
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    });
-    progress.end();
-    match outcome? {
+    match train(&mut trainer, &run, &Stop::on_signal()?)? {
         Outcome::Finished => {
             writeln!(out, "{}", run.weights().display())?;
             writeln!(out, "weights {}", trainer.weights_digest())?;
@@ -80,12 +61,51 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
             let (done, all) = (trainer.steps_done(), trainer.schedule().steps());
             eprintln!("stopped and saved after step {done} of {all}; go on with");
             eprintln!("  {}", resume_command(&args));
-            Ok(ExitCode::from(INTERRUPTED))
+            Ok(interrupted())
         }
     }
 }
 
-fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
+/// Trains to the end or until asked to stop, and shows how far it has come.
+///
+/// # Errors
+/// As [`Trainer::run`].
+pub fn train(
+    trainer: &mut Trainer<'_>,
+    run: &RunFolder,
+    stop: &Stop,
+) -> Result<Outcome, TrainingError> {
+    let mut progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
+    let outcome = trainer.run(Some(run), &mut |report| {
+        progress.step(report);
+        match stop.is_asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
+    progress.end();
+    outcome
+}
+
+/// Takes a run up where its newest whole checkpoint left it, and says so.
+///
+/// # Errors
+/// The run is of another config or other data, or has no whole checkpoint.
+pub fn resume(
+    trainer: &mut Trainer<'_>,
+    path: &Path,
+    config: &ExperimentConfig,
+) -> anyhow::Result<RunFolder> {
+    let run = RunFolder::resume(path, config)?;
+    let resumed = trainer.resume(&run)?;
+    for problem in &resumed.damaged {
+        eprintln!("warning: a newer checkpoint is left out: {problem}");
+    }
+    writeln!(std::io::stdout(), "goes on after step {}", resumed.steps)?;
+    Ok(run)
+}
+
+pub fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
     let schedule = trainer.schedule();
     writeln!(
         std::io::stdout(),
@@ -104,21 +124,6 @@ fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A flag that Ctrl-C or SIGTERM sets; the second time ends the process at once, which loses the steps since the last
-/// checkpoint only.
-fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED.into());
-        }
-        eprintln!("stopping after this step; once more to stop at once");
-    })
-    .context("no handler for Ctrl-C")?;
-    Ok(stop)
-}
-
 /// The command that goes on where `args` stopped.
 fn resume_command(args: &TrainArgs) -> String {
     let path = |path: &Path| quote(&path.to_string_lossy());
@@ -128,6 +133,9 @@ fn resume_command(args: &TrainArgs) -> String {
         path(&args.data),
         path(&args.out)
     );
+    if let Some(budget) = &args.budget {
+        command += &format!(" --budget {}", path(budget));
+    }
     for set in &args.set {
         command += &format!(" --set {}", quote(set));
     }
@@ -135,16 +143,6 @@ fn resume_command(args: &TrainArgs) -> String {
         command += &format!(" --threads {threads}");
     }
     command + " --resume"
-}
-
-/// A word for the shell.
-fn quote(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/=:,+@".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.into()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 #[cfg(test)]
@@ -157,13 +155,14 @@ mod tests {
             config: "a b.toml".into(),
             data: "data".into(),
             out: "runs/1".into(),
+            budget: Some("budget.toml".into()),
             set: vec!["name=x".into(), "data.split={ share = 0.5 }".into()],
             resume: false,
             threads: Threads::of(2),
         };
         assert_eq!(
             resume_command(&args),
-            "keydance train 'a b.toml' --data data --out runs/1 --set name=x \
+            "keydance train 'a b.toml' --data data --out runs/1 --budget budget.toml --set name=x \
              --set 'data.split={ share = 0.5 }' --threads 2 --resume"
         );
     }

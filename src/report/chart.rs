@@ -3,19 +3,24 @@
 use super::FigureError;
 use super::svg::{Anchor, Font, Stroke, Svg};
 
+/// Width of a chart whose legend has short names; long ones widen it.
 const WIDTH: f64 = 880.0;
+/// Width of a letter of the legend, generously.
+const LETTER: f64 = 7.4;
 const HEIGHT: f64 = 480.0;
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 680.0;
+/// Where the names of the legend begin.
+const LEGEND: f64 = RIGHT + 54.0;
 const TOP: f64 = 56.0;
 const BOTTOM: f64 = 416.0;
 const INK: &str = "#222222";
 const FAINT: &str = "#e3e3e3";
 
 /// Colours of the lines in their order, most of them Okabe and Ito's, which stay apart for colour-blind readers.
-const COLOURS: [&str; 9] = [
+const COLOURS: [&str; 12] = [
     "#222222", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6a00",
-    "#882255",
+    "#882255", "#6f6f6f", "#332288", "#8fbc3a",
 ];
 
 /// How numbers become places along an axis.
@@ -96,7 +101,13 @@ impl Chart {
         let across = Range::of(&self.x, points().map(|point| point.0), LEFT, RIGHT);
         let up = Range::of(&self.y, points().map(|point| point.1), BOTTOM, TOP);
 
-        let mut svg = Svg::new(WIDTH, HEIGHT, &self.title);
+        let longest = self
+            .lines
+            .iter()
+            .map(|line| line.name.chars().count())
+            .max();
+        let legend = LEGEND + LETTER * longest.unwrap_or(0) as f64;
+        let mut svg = Svg::new(WIDTH.max(legend), HEIGHT, &self.title);
         let mut heading = Font::new(17.0, INK, Anchor::Start);
         heading.bold = true;
         svg.text([LEFT, 32.0], &self.title, heading);
@@ -166,11 +177,7 @@ fn draw_line(svg: &mut Svg, line: &Line, places: &[[f64; 2]], index: usize) {
             svg.ellipse(place, [3.6, 3.6], colour, Stroke::solid("#ffffff", 1.0));
         }
     }
-    svg.text(
-        [RIGHT + 54.0, y],
-        &line.name,
-        Font::new(12.5, INK, Anchor::Start),
-    );
+    svg.text([LEGEND, y], &line.name, Font::new(12.5, INK, Anchor::Start));
     svg.end_group();
 }
 

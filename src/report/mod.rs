@@ -8,10 +8,12 @@ pub mod loss_curve;
 pub mod lrp_curve;
 pub mod motion_figure;
 pub mod svg;
+pub mod validation_curve;
 
 pub use loss_curve::{LossSeries, loss_curve};
 pub use lrp_curve::{LrpSeries, lrp_curve};
 pub use motion_figure::{MotionFigure, MotionRow};
+pub use validation_curve::{ValidationSeries, validation_curve};
 
 /// Why a figure cannot be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
