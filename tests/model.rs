@@ -3,13 +3,17 @@
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
-use keydance::data::Standardisation;
+use keydance::data::choreography::{ChoreographyConfig, generate};
+use keydance::data::{DanceClip, DataConfig, RootFrame, Standardisation, window_features};
+use keydance::evaluation::window_request;
 use keydance::models::gradient_check::{
     GradientCase, GradientCheckConfig, check_model, generated_windows,
 };
-use keydance::models::pan2021::{Controllers, LossWeights, Pan2021, Pan2021Config};
-use keydance::models::{Batch, Feed, ModelConfig, Network};
-use keydance::motion::features::{FEATURES, FRAME};
+use keydance::models::pan2021::{Controllers, LossWeights, Output, Pan2021, Pan2021Config};
+use keydance::models::{
+    Batch, Feed, ModelConfig, Network, TrainedModel, Transition, TransitionModel, TransitionRequest,
+};
+use keydance::motion::features::{FEATURES, FRAME, ROOT_POSITION};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, Axis, s};
 use rand::SeedableRng;
@@ -55,6 +59,13 @@ fn without_key_loss() -> Pan2021Config {
             key: 0.0,
             ..LossWeights::default()
         },
+        ..whole_model()
+    }
+}
+
+fn residual() -> Pan2021Config {
+    Pan2021Config {
+        output: Output::Residual,
         ..whole_model()
     }
 }
@@ -394,9 +405,15 @@ fn the_gradient_without_key_loss_is_that_of_central_differences() {
     gradients_are_right(&without_key_loss());
 }
 
-/// The ablations that change the network.
-fn networks() -> [Pan2021Config; 5] {
+#[test]
+fn the_gradient_of_residual_outputs_is_that_of_central_differences() {
+    gradients_are_right(&residual());
+}
+
+/// The ablations and options that change the network.
+fn networks() -> [Pan2021Config; 6] {
     [
+        residual(),
         whole_model(),
         one_lstm(),
         condition_fc(),
@@ -572,5 +589,190 @@ fn features_of_another_shape_are_refused_with_their_shape() {
         let (frames, windows, numbers) = shape;
         let found = format!("[{frames}, {windows}, {numbers}]");
         assert!(error.to_string().contains(&found), "{error}");
+    }
+}
+
+/// Sets columns of a weight to zero: what enters there is not read.
+fn cut_columns(built: &mut Built<f64>, weight: &str, columns: std::ops::Range<usize>) {
+    let (_, value) = built
+        .parameters
+        .values_mut()
+        .find(|(name, _)| *name == weight)
+        .unwrap();
+    value.slice_axis_mut(Axis(1), columns.into()).fill(0.0);
+}
+
+/// Whether the prediction moves when one number of the batch does.
+fn reads(built: &Built<f64>, features: &Array3<f64>, row: usize, column: usize) -> bool {
+    let mut changed = features.clone();
+    changed[[row, 0, column]] += 0.5;
+    largest_difference(&predict(built, features), &predict(built, &changed)) > 1e-9
+}
+
+#[test]
+fn each_code_enters_the_lstms_at_its_own_place() {
+    let (features, standardisation) = generated_windows(9, 2, 13).unwrap();
+    // Codes are 8 wide here: state, velocity, root trajectory, velocity factor; the target's beside the first LSTM's output.
+    let (one, two) = ("lstm.weight_ih_l0", "lstm2.weight_ih_l0");
+    let first = "lstm1.weight_ih_l0";
+    for (config, weight, columns, what, row, column) in [
+        (whole_model(), first, 8..16, "velocity of k1", 0, 100),
+        (whole_model(), first, 24..32, "velocity factor", 4, 150),
+        (whole_model(), two, 8..16, "pose of k2", 9, 20),
+        (one_lstm(), one, 8..16, "velocity of k1", 0, 100),
+        (one_lstm(), one, 24..32, "velocity factor", 4, 150),
+        (one_lstm(), one, 32..40, "pose of k2", 9, 20),
+        (condition_fc(), first, 24..32, "velocity factor", 4, 150),
+        (without_velocity_factor(), two, 8..16, "pose of k2", 9, 20),
+    ] {
+        let mut built: Built<f64> = build(&config.small(), &standardisation);
+        assert!(reads(&built, &features, row, column), "{what}: {config:?}");
+        cut_columns(&mut built, weight, columns);
+        assert!(!reads(&built, &features, row, column), "{what}: {config:?}");
+    }
+    // The trajectory enters by its code and by its place alone.
+    for (config, weight) in [
+        (whole_model(), first),
+        (one_lstm(), one),
+        (condition_fc(), first),
+        (one_decoder(), first),
+        (without_velocity_factor(), first),
+    ] {
+        let mut built: Built<f64> = build(&config.small(), &standardisation);
+        cut_columns(&mut built, weight, 16..24);
+        assert!(reads(&built, &features, 5, 70), "{config:?}");
+        cut_columns(&mut built, "position_encoder.0.weight", 0..3);
+        assert!(!reads(&built, &features, 5, 70), "{config:?}");
+    }
+}
+
+#[test]
+fn each_output_of_the_decoders_is_its_number_of_the_frame() {
+    let (features, standardisation) = generated_windows(1, 2, 13).unwrap();
+    let (state, root) = ("state_decoder.4.bias", "root_decoder.4.bias");
+    for (config, bias, output, number) in [
+        (whole_model(), state, 68, 68),
+        (whole_model(), state, 69, 73),
+        (whole_model(), state, 73, 77),
+        (whole_model(), root, 0, 69),
+        (whole_model(), root, 3, 72),
+        (whole_model(), root, 4, 146),
+        (one_decoder(), state, 68, 68),
+        (one_decoder(), state, 69, 69),
+        (one_decoder(), state, 148, 148),
+    ] {
+        let mut built: Built<f64> = build(&config.small(), &standardisation);
+        let before = predict(&built, &features);
+        let values = built.parameters.values_mut();
+        for (_, value) in values.filter(|(name, _)| *name == bias) {
+            value.as_slice_mut().unwrap()[output] += 1.0;
+        }
+        let moved = predict(&built, &features) - before;
+        for (column, moved) in moved.index_axis(Axis(0), 0).axis_iter(Axis(1)).enumerate() {
+            let expected = f64::from(u8::from(column == number));
+            assert!(
+                moved.iter().all(|x| (x - expected).abs() < 1e-12),
+                "{bias} {output} moves {column}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_residual_of_nothing_is_the_line_between_the_keyframes_on_the_given_trajectory() {
+    let (features, standardisation) = generated_windows(8, 2, 13).unwrap();
+    for decoders in [1, 2] {
+        let config = Pan2021Config {
+            decoders,
+            ..residual().small()
+        };
+        let mut built: Built<f64> = build(&config, &standardisation);
+        for (name, value) in built.parameters.values_mut() {
+            if name.contains("decoder.4") {
+                value.fill(0.0);
+            }
+        }
+        let predicted = predict(&built, &features);
+        for ((t, window, column), found) in predicted.indexed_iter() {
+            let between = |row: usize| features[[row, window, column]];
+            let share = (t + 1) as f64 / 8.0;
+            let expected = match column {
+                0..69 | 72 => between(0) + share * (between(8) - between(0)),
+                69..72 => between(t + 1),
+                _ => 0.0,
+            };
+            assert!((found - expected).abs() < 1e-12, "{t} {column}");
+        }
+    }
+}
+
+/// The same request `shift` further on, cm.
+fn moved(request: &TransitionRequest, shift: [f64; 3]) -> TransitionRequest {
+    let mut moved = request.clone();
+    for keyframe in [&mut moved.start, &mut moved.target] {
+        keyframe.pose.translations[0] += glam::DVec3::from_array(shift);
+        for (column, shift) in ROOT_POSITION.zip(shift) {
+            keyframe.features[column] += shift;
+        }
+    }
+    for (mut column, shift) in moved.root_trajectory.columns_mut().into_iter().zip(shift) {
+        column += shift;
+    }
+    moved
+}
+
+#[test]
+fn with_roots_from_the_keyframe_a_dance_elsewhere_on_the_floor_is_the_same_dance() {
+    let generated = generate(&ChoreographyConfig {
+        clips: 2,
+        frames_per_clip: 120,
+        seed: 4,
+    });
+    let clips: Vec<DanceClip> = generated
+        .unwrap()
+        .into_iter()
+        .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()).unwrap())
+        .collect();
+    let (clip, start, length) = (&clips[0], 30, 20);
+    let window = window_features(&clip.features, start, length);
+    let request = window_request(&clip.clip, start, window.view()).unwrap();
+    let shift = [250.0, 0.0, -130.0];
+    let raised = [0.0, 40.0, 0.0];
+    for root_frame in [RootFrame::Keyframe, RootFrame::World] {
+        let views: Vec<_> = clips.iter().map(|clip| clip.features.view()).collect();
+        let standardisation = root_frame.standardisation(views, length);
+        let config = Pan2021Config {
+            root_frame,
+            ..residual().small()
+        };
+        let built: Built<f32> = build(&config, &standardisation);
+        let model = TrainedModel::new(
+            "small".into(),
+            Box::new(built.network) as Box<dyn Network<f32>>,
+            built.parameters,
+            standardisation,
+            ModelConfig::Pan2021(config).root_frame(),
+        );
+        let requests = [
+            request.clone(),
+            moved(&request, shift),
+            moved(&request, raised),
+        ];
+        let [here, there, above] = model.transitions(&requests).unwrap().try_into().unwrap();
+        // Near the trajectory that was asked for, in the world.
+        let near =
+            &here.frames.slice(s![.., ROOT_POSITION]) - &request.root_trajectory.slice(s![1.., ..]);
+        assert!(near.iter().all(|x| x.abs() < 150.0), "{near:?}");
+        let difference = |other: &Transition, shift: [f64; 3]| {
+            let mut difference = &other.frames - &here.frames;
+            for (column, shift) in ROOT_POSITION.zip(shift) {
+                difference.column_mut(column).mapv_inplace(|x| x - shift);
+            }
+            difference.iter().fold(0f64, |most, x| most.max(x.abs()))
+        };
+        let same = difference(&there, shift) < 1e-2;
+        assert_eq!(same, root_frame == RootFrame::Keyframe);
+        // Heights are above the floor in either.
+        assert!(difference(&above, raised) > 0.1);
     }
 }

@@ -1,9 +1,12 @@
 """Agreement of outputs, loss terms and gradients: keydance against PyTorch, plain against optimised."""
 
+import json
 import math
 import sys
+import tomllib
 
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file
 
 from layout import FEATURES, OUTPUTS, Statistics
@@ -55,6 +58,7 @@ def compare(title, ours, theirs, tolerance):
 
 def load_model(path, dtype):
     """The reference model with a checkpoint's weights and statistics, dropout off."""
+    refuse_other_outputs(path)
     entries = load_file(path)
     missing = {"feature_mean", "feature_std", "position_scale", "velocity_scale"} - entries.keys()
     if missing:
@@ -73,6 +77,16 @@ def load_model(path, dtype):
     except RuntimeError as error:
         raise SystemExit(f"{path}: {error}") from None
     return model.eval()
+
+
+def refuse_other_outputs(path):
+    """The reference has the paper's network only; what `root_frame` changes is in statistics and batch."""
+    with safe_open(path, "pt") as file:
+        written = (file.metadata() or {}).get("keydance")
+    config = tomllib.loads(json.loads(written)["config"]) if written else {}
+    output = config.get("model", {}).get("output", "absolute")
+    if output != "absolute":
+        raise SystemExit(f"{path}: model.output = {output}: the PyTorch version has absolute only")
 
 
 def load_batch(path, parameters):

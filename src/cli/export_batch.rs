@@ -10,7 +10,7 @@ use ndarray::{Array3, Axis};
 use safetensors::tensor::{Dtype, TensorView};
 
 use crate::autograd::{Gradients, Tape, Workspace};
-use crate::data::{Dataset, window_features, windows};
+use crate::data::{Dataset, RootFrame, Standardisation, windows};
 use crate::models::{Batch, Feed};
 use crate::training::{RunFolder, replace_file};
 
@@ -47,7 +47,8 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let config = run.config()?;
     let model = run.trained_model(&config)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
-    let features = cut(&args, &dataset, model.standardisation())?;
+    let root_frame = config.model.root_frame();
+    let features = cut(&args, &dataset, model.standardisation(), root_frame)?;
     let (parameters, network) = (model.parameters(), model.network());
     let mut workspace = Workspace::new();
     let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &features)?;
@@ -88,7 +89,8 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
 fn cut(
     args: &ExportBatchArgs,
     dataset: &Dataset,
-    standardisation: &crate::data::Standardisation,
+    standardisation: &Standardisation,
+    root_frame: RootFrame,
 ) -> anyhow::Result<Array3<f32>> {
     let (frames, count) = (usize::from(args.frames), usize::from(args.windows));
     let lengths: Vec<usize> = dataset.train.iter().map(|clip| clip.frames()).collect();
@@ -105,7 +107,7 @@ fn cut(
     for (k, mut target) in features.axis_iter_mut(Axis(1)).enumerate() {
         let window = all[k * all.len() / count];
         let clip = &dataset.train[window.clip].features;
-        let cut = window_features(clip, window.start, frames);
+        let cut = root_frame.window_features(clip, window.start, frames);
         target.assign(&standardisation.standardise(cut.view()).mapv(|x| x as f32));
     }
     Ok(features)

@@ -3,6 +3,7 @@
 pub mod choreography;
 pub mod config;
 pub mod dataset;
+pub mod root_frame;
 mod split;
 pub mod standardise;
 pub mod window;
@@ -11,6 +12,7 @@ pub mod windows;
 pub use config::{DataConfig, Split};
 pub(crate) use dataset::hexadecimal;
 pub use dataset::{DanceClip, DataError, Dataset};
+pub use root_frame::RootFrame;
 pub use standardise::Standardisation;
 pub use window::window_features;
 pub use windows::{Window, Windows, windows};

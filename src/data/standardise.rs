@@ -7,7 +7,7 @@ use super::window::wrap;
 use crate::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING, FEATURES};
 
 /// A standard deviation below this, in the feature's unit, counts as 1: a number that never changes is only centred.
-const SMALLEST_STD: f64 = 1e-4;
+pub(super) const SMALLEST_STD: f64 = 1e-4;
 
 /// Mean and standard deviation of the 154 numbers of a frame, and the scales of the losses that are not standardised.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use super::interpolation::Interpolation;
 use super::pan2021::{Pan2021, Pan2021Config};
 use super::{ModelError, Network, TransitionModel};
 use crate::autograd::Real;
-use crate::data::Standardisation;
+use crate::data::{RootFrame, Standardisation};
 use crate::nn::Initialiser;
 
 /// The `[model]` table of an experiment's config; `kind` says which.
@@ -47,6 +47,14 @@ impl ModelConfig {
                 model: "interpolation".into(),
                 reason: "has no weights and needs no training; evaluate its config as it is".into(),
             }),
+        }
+    }
+
+    /// Where the windows that the network reads have the origin of their root positions.
+    pub fn root_frame(&self) -> RootFrame {
+        match self {
+            Self::Pan2021(config) => config.root_frame,
+            _ => RootFrame::World,
         }
     }
 

@@ -6,8 +6,8 @@ use ndarray::{Array2, Array3, s};
 
 use super::{ModelError, Network, Transition, TransitionModel, TransitionRequest};
 use crate::autograd::{Parameters, Tape, Workspace};
-use crate::data::Standardisation;
 use crate::data::window::wrap;
+use crate::data::{RootFrame, Standardisation};
 use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS};
 
 /// A trained network, in f32.
@@ -16,22 +16,25 @@ pub struct TrainedModel {
     network: Arc<dyn Network<f32>>,
     parameters: Parameters<f32>,
     standardisation: Standardisation,
+    root_frame: RootFrame,
     workspaces: Mutex<Vec<Workspace<f32>>>,
 }
 
 impl TrainedModel {
-    /// `parameters` are those that `network` was built with.
+    /// `parameters` are those that `network` was built with, `standardisation` and `root_frame` those that it was trained in.
     pub fn new(
         name: String,
         network: impl Into<Arc<dyn Network<f32>>>,
         parameters: Parameters<f32>,
         standardisation: Standardisation,
+        root_frame: RootFrame,
     ) -> Self {
         Self {
             name,
             network: network.into(),
             parameters,
             standardisation,
+            root_frame,
             workspaces: Mutex::new(Vec::new()),
         }
     }
@@ -46,6 +49,12 @@ impl TrainedModel {
 
     pub fn standardisation(&self) -> &Standardisation {
         &self.standardisation
+    }
+
+    /// Origin of the network's root positions in a request, cm.
+    fn origin(&self, request: &TransitionRequest) -> [f64; 3] {
+        let first = std::array::from_fn(|axis| request.root_trajectory[[0, axis]]);
+        self.root_frame.origin(first)
     }
 
     /// The network's inputs for requests of one length, `[N + 1, windows, 154]`, standardised; what is not given is 0.
@@ -65,14 +74,15 @@ impl TrainedModel {
                     features[[row, window, number]] = standardise(value, number);
                 }
             }
+            let origin = self.origin(request);
             for row in 0..=length {
-                for (columns, given) in [
-                    (ROOT_POSITION, &request.root_trajectory),
-                    (VELOCITY_FACTORS, &request.velocity_factors),
-                ] {
-                    for (k, number) in columns.enumerate() {
-                        features[[row, window, number]] = standardise(given[[row, k]], number);
-                    }
+                for (k, number) in ROOT_POSITION.enumerate() {
+                    let place = request.root_trajectory[[row, k]] - origin[k];
+                    features[[row, window, number]] = standardise(place, number);
+                }
+                for (k, number) in VELOCITY_FACTORS.enumerate() {
+                    let factor = request.velocity_factors[[row, k]];
+                    features[[row, window, number]] = standardise(factor, number);
                 }
             }
         }
@@ -106,6 +116,7 @@ impl TrainedModel {
         for (window, request) in requests.iter().enumerate() {
             let facing = request.start.features[FACING.start];
             let shift = wrap(facing) - facing;
+            let origin = self.origin(request);
             let mut frames = Array2::zeros((length, FRAME));
             for (mut out, row) in frames
                 .rows_mut()
@@ -117,6 +128,9 @@ impl TrainedModel {
                         + self.standardisation.mean[number];
                 }
                 out[FACING.start] -= shift;
+                for (number, origin) in ROOT_POSITION.zip(origin) {
+                    out[number] += origin;
+                }
             }
             let transition = Transition { frames };
             transition.check(length)?;

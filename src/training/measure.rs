@@ -12,7 +12,7 @@ use super::schedule::BatchPlan;
 use super::step::{StepInput, Stepper, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
-use crate::data::{Standardisation, Window};
+use crate::data::{RootFrame, Standardisation, Window};
 use crate::models::{Feed, Network};
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
@@ -77,6 +77,7 @@ impl MeasuredStep {
         let windows = TrainingWindows {
             clips: vec![&self.clip],
             standardisation: self.standardisation.clone(),
+            root_frame: RootFrame::World,
         };
         let input = StepInput {
             network: &*self.network,

@@ -151,6 +151,7 @@ impl RunFolder {
             network,
             parameters,
             saved.standardisation,
+            config.model.root_frame(),
         ))
     }
 

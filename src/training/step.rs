@@ -11,7 +11,7 @@ use super::error::TrainingError;
 use super::schedule::{BatchPlan, parts};
 use super::streams::Streams;
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
-use crate::data::{Standardisation, Window, window_features};
+use crate::data::{RootFrame, Standardisation, Window};
 use crate::evaluation::Evaluation;
 use crate::models::{Batch, Feed, Network};
 use crate::motion::features::FEATURES;
@@ -69,6 +69,7 @@ pub(super) struct TrainingWindows<'d> {
     /// `[frames, 154]` each, not standardised.
     pub clips: Vec<&'d Array2<f64>>,
     pub standardisation: Standardisation,
+    pub root_frame: RootFrame,
 }
 
 impl TrainingWindows<'_> {
@@ -76,7 +77,8 @@ impl TrainingWindows<'_> {
     fn cut(&self, windows: &[Window], length: usize) -> Array3<f32> {
         let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
         for (k, window) in windows.iter().enumerate() {
-            let cut = window_features(self.clips[window.clip], window.start, length);
+            let clip = self.clips[window.clip];
+            let cut = self.root_frame.window_features(clip, window.start, length);
             features.index_axis_mut(Axis(1), k).assign(
                 &self
                     .standardisation

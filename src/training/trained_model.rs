@@ -57,6 +57,7 @@ impl RunFolder {
             network,
             parameters,
             saved.standardisation,
+            config.model.root_frame(),
         ))
     }
 }

@@ -98,7 +98,6 @@ impl<'d> Trainer<'d> {
         })?;
         let config_toml = config.to_toml()?;
         let clips: Vec<_> = dataset.train.iter().map(|clip| &clip.features).collect();
-        let standardisation = Standardisation::fit(clips.iter().map(|clip| clip.view()));
         let streams = Streams::new(config.seed);
         let frames: Vec<usize> = dataset.train.iter().map(DanceClip::frames).collect();
         let schedule = Schedule::new(&frames, &config.schedule, streams);
@@ -111,6 +110,12 @@ impl<'d> Trainer<'d> {
                 longest: frames.iter().copied().max().unwrap_or(0),
             });
         }
+        let root_frame = config.model.root_frame();
+        // Of the longest transitions that are trained.
+        let longest = frames.iter().map(|frames| frames.saturating_sub(1)).max();
+        let transition = config.schedule.max_len.min(longest.unwrap_or(0));
+        let views = clips.iter().map(|clip| clip.view());
+        let standardisation = root_frame.standardisation(views, transition);
         if config.validation.is_some() && dataset.validation.is_empty() {
             return Err(TrainingError::NoValidationClips);
         }
@@ -123,6 +128,7 @@ impl<'d> Trainer<'d> {
             windows: TrainingWindows {
                 clips,
                 standardisation,
+                root_frame,
             },
             streams,
             schedule,
@@ -188,6 +194,7 @@ impl<'d> Trainer<'d> {
             self.network.clone(),
             self.parameters.clone(),
             self.windows.standardisation.clone(),
+            self.windows.root_frame,
         )
     }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::data::RootFrame;
 use crate::models::ModelError;
 use crate::nn::TransformerSizes;
 
@@ -13,6 +14,17 @@ pub enum Controllers {
     Transformer,
     /// Two fully connected layers over both segments ("Condition-FC").
     FullyConnected,
+}
+
+/// What the decoders' numbers of p^b, p^r and o^r are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    /// The frame itself, as in the paper.
+    Absolute,
+    /// What is added to a plain guess: p^b and o^r between those of the keyframes, linearly, p^r the given trajectory. So an untrained
+    /// network is near interpolation.
+    Residual,
 }
 
 /// Weights of the terms of eq. 3, and m of eq. 10.
@@ -54,6 +66,10 @@ pub struct Pan2021Config {
     pub decoders: usize,
     /// false for "Without Velfac constraint": no velocity factor controller and no L_vfac.
     pub velocity_factor: bool,
+    /// Origin of root positions; the paper's is the world's.
+    pub root_frame: RootFrame,
+    /// What the decoders give; the paper's give the frame itself.
+    pub output: Output,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,
     /// Codes, LSTM states, Transformer tokens, second hidden layer of the decoders.
@@ -76,6 +92,8 @@ impl Default for Pan2021Config {
             controllers: Controllers::Transformer,
             decoders: 2,
             velocity_factor: true,
+            root_frame: RootFrame::World,
+            output: Output::Absolute,
             hidden: 512,
             code: 256,
             window: 7,

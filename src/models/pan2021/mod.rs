@@ -14,5 +14,5 @@ mod losses;
 mod network;
 mod units;
 
-pub use config::{Controllers, LossWeights, Pan2021Config};
+pub use config::{Controllers, LossWeights, Output, Pan2021Config};
 pub use network::Pan2021;

@@ -3,14 +3,16 @@
 use ndarray::Array3;
 use rand::Rng;
 
-use super::config::Pan2021Config;
+use super::config::{Output, Pan2021Config};
 use super::controller::{Controller, Session, Trajectory};
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::data::Standardisation;
 use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
-use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::features::{
+    BODY_POSITIONS, FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
+};
 use crate::nn::{Initialiser, Lstm, Mlp};
 
 /// Numbers of the state encoder's input: p^b, p^r, o^r, c.
@@ -305,6 +307,19 @@ impl<T: Real> Rollout<'_, '_, T> {
                 hidden
             }
         };
+        let decoded = self.decode(tape, hidden)?;
+        match network.config.output {
+            Output::Absolute => Ok(decoded),
+            Output::Residual => {
+                let guess = self.guess(tape, t);
+                tape.add(decoded, guess)
+            }
+        }
+    }
+
+    /// The decoders' numbers, `[windows, 149]`.
+    fn decode(&self, tape: &mut Tape<'_, T>, hidden: Var) -> Result<Var, AutogradError> {
+        let network = self.network;
         let decoded = network.state_decoder.forward(tape, hidden)?;
         let Some(root_decoder) = &network.root_decoder else {
             return Ok(decoded);
@@ -317,6 +332,26 @@ impl<T: Real> Rollout<'_, '_, T> {
             tape.columns(root, 4..DECODED_ROOT)?,
         ];
         tape.concat(&parts)
+    }
+
+    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b and o^r linearly between the keyframes, p^r of the
+    /// given trajectory; c, v^b and v^r 0, their means.
+    fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
+        let share = T::from_f64((t + 1) as f64 / self.transition as f64);
+        let frame = |index: usize| {
+            self.values[index * self.windows * FEATURES..(index + 1) * self.windows * FEATURES]
+                .chunks_exact(FEATURES)
+        };
+        let given = frame(0).zip(frame(t + 1)).zip(frame(self.transition));
+        tape.constant_with(&[self.windows, FRAME], |out| {
+            for (out, ((first, now), last)) in out.chunks_exact_mut(FRAME).zip(given) {
+                for column in BODY_POSITIONS.chain(FACING) {
+                    out[column] = first[column] + (last[column] - first[column]) * share;
+                }
+                out[ROOT_POSITION].copy_from_slice(&now[ROOT_POSITION]);
+                out[FACING.end..].fill(T::zero());
+            }
+        })
     }
 
     /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 - k1) (eq. 2).
