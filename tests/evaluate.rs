@@ -467,6 +467,27 @@ fn clips_other_than_the_test_clips_are_named_in_the_json_and_have_files_of_their
 }
 
 #[test]
+fn lengths_of_ones_own_are_scored_each_once() {
+    let out = TempDir::new().unwrap();
+    let file = out.path().join("scores.json");
+    evaluate(&FIXTURE.path("interpolation.toml"))
+        .args(["--lengths", "30,5,30", "--json"])
+        .arg(&file)
+        .assert()
+        .success();
+    let scores = json(&file);
+    let lengths: Vec<&String> = scores["windows"].as_object().unwrap().keys().collect();
+    assert_eq!(lengths.len(), 2);
+    let lrp = |key: &str| scores["lrp"][key].as_f64().unwrap();
+    assert!((lrp("avg") - (lrp("5") + lrp("30")) / 2.0).abs() < 1e-12);
+    evaluate(&FIXTURE.path("interpolation.toml"))
+        .args(["--lengths", "0"])
+        .assert()
+        .failure()
+        .stderr(contains("--lengths"));
+}
+
+#[test]
 fn clips_that_a_run_was_trained_on_are_not_set_aside_afterwards_without_consent() {
     let run = copied_run();
     let asked = || {

@@ -414,6 +414,20 @@ fn the_papers_configs_load_and_differ_from_the_whole_model_by_their_name_and_one
 }
 
 #[test]
+fn the_budget_goes_over_every_config_of_the_paper_and_leaves_its_model() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let budget = folder.join("budget/two_cores.toml");
+    for file in fs::read_dir(folder.join("paper")).unwrap() {
+        let file = file.unwrap().path();
+        let plain = ExperimentConfig::load(&file, &[]).unwrap();
+        let config = ExperimentConfig::load_under(&file, Some(&budget), &[]).unwrap();
+        assert_eq!((&config.name, &config.model), (&plain.name, &plain.model));
+        assert_eq!(config.schedule.batch_size, 32, "{}", file.display());
+    }
+    assert!(ExperimentConfig::load(&folder.join("checks/overfit.toml"), &[]).is_ok());
+}
+
+#[test]
 fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
     let data = dataset();
     let sets = [

@@ -1,5 +1,6 @@
 //! `keydance evaluate`: reads a run's folder (or the config of a model that needs no training) and a data folder, writes scores.
 
+use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,9 @@ pub struct EvaluateArgs {
     /// Which clips to score on
     #[arg(long, value_enum, default_value_t)]
     clips: ClipChoice,
+    /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is the mean over these
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    lengths: Vec<u16>,
     /// Write the scores here, too; a run's folder gets them anyway, as evaluation.json (evaluation_validation.json,
     /// evaluation_train.json)
     #[arg(long, value_name = "FILE")]
@@ -62,7 +66,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     let outcome = args
         .threads
         .pool()?
-        .install(|| evaluate_watched(&Protocol::default(), subject.model.as_ref(), clips))?;
+        .install(|| evaluate_watched(&args.protocol(), subject.model.as_ref(), clips))?;
     for skipped in &outcome.skipped {
         eprintln!("warning: {skipped}");
     }
@@ -84,6 +88,20 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         record.write(folder)?;
     }
     Ok(())
+}
+
+impl EvaluateArgs {
+    fn protocol(&self) -> Protocol {
+        let paper = Protocol::default();
+        if self.lengths.is_empty() {
+            return paper;
+        }
+        let lengths = BTreeSet::from_iter(self.lengths.iter().map(|&length| length.into()));
+        Protocol {
+            lengths: lengths.into_iter().collect(),
+            ..paper
+        }
+    }
 }
 
 /// What is evaluated.
