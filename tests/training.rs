@@ -424,7 +424,17 @@ fn the_budget_goes_over_every_config_of_the_paper_and_leaves_its_model() {
         assert_eq!((&config.name, &config.model), (&plain.name, &plain.model));
         assert_eq!(config.schedule.batch_size, 32, "{}", file.display());
     }
-    assert!(ExperimentConfig::load(&folder.join("checks/overfit.toml"), &[]).is_ok());
+}
+
+#[test]
+fn the_overfit_check_trains_on_one_clip_and_tests_on_none() {
+    let file = "experiments/checks/overfit.toml";
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    let config = ExperimentConfig::load(&file, &[]).unwrap();
+    let keydance::data::Split::List { train, test } = config.data.split else {
+        panic!("{:?}", config.data.split);
+    };
+    assert_eq!((train.len(), test.len()), (1, 0));
 }
 
 #[test]
