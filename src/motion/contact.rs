@@ -23,9 +23,36 @@ pub fn contacts(world: &[Vec<DVec3>], threshold: f64) -> Vec<[f64; 4]> {
     labels
 }
 
+/// Foot skate: the mean distance (cm/frame) that a foot joint moves in the world from the frame before to one in which it is in contact. None
+/// where no joint is.
+///
+/// `world`: world positions of the dance skeleton's joints, `[frames][24]`, cm; `contacts`: `[frames]` in the order of [`FOOT_JOINTS`].
+pub fn foot_skate(world: &[Vec<DVec3>], contacts: &[[bool; 4]]) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for (pair, contacts) in world.windows(2).zip(contacts.iter().skip(1)) {
+        for (joint, _) in FOOT_JOINTS.iter().zip(contacts).filter(|(_, on)| **on) {
+            sum += pair[1][*joint].distance(pair[0][*joint]);
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / f64::from(count))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn skate_counts_only_feet_in_contact() {
+        let mut frames = vec![vec![DVec3::ZERO; 24]; 3];
+        frames[1][3].x = 2.0;
+        frames[2][3].x = 3.0;
+        frames[2][7].y = 50.0;
+        let on = |left, right| [left, false, right, false];
+        let contacts = [on(true, true), on(true, false), on(true, false)];
+        assert_eq!(foot_skate(&frames, &contacts), Some(1.5));
+        assert_eq!(foot_skate(&frames, &[[false; 4]; 3]), None);
+    }
 
     #[test]
     fn a_planted_foot_of_a_moving_dancer_is_in_contact() {

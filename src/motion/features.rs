@@ -119,7 +119,7 @@ pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, Feat
 }
 
 /// p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame.
-fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
+pub(crate) fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
     let root = positions[0];
     let turn = DQuat::from_rotation_y(-facing);
     for (joint, &position) in positions.iter().enumerate().skip(1) {

@@ -1,5 +1,21 @@
-//! Synthesis: what a model predicted becomes motion that can be played.
+//! Synthesis: keyframes and controls become motion that can be played.
+//!
+//! A [`SequenceRequest`] holds keyframes, root trajectory and velocity factors; the methods of [`controls`] change them; [`synthesise`] asks a
+//! model for one transition after another, fits joint rotations to what it predicts, bends each transition onto its keyframe
+//! and, where asked, pins the feet.
 
+mod blend;
+pub mod controls;
+mod error;
+mod foot_cleanup;
 mod motion;
+mod request;
+mod retarget;
+mod sequence;
 
+pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
+pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};
+pub use sequence::{
+    CONTACT_LABEL, FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise,
+};

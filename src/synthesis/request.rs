@@ -1,0 +1,229 @@
+//! What a sequence is made from: keyframes in time, the root trajectory, the velocity factors.
+
+use ndarray::{Array2, ArrayView2, s};
+
+use super::SynthesisError;
+use super::controls::{rows_of, timed_curve};
+use super::retarget::{bones_of, retarget, with_constant_bones};
+use crate::data::DanceClip;
+use crate::data::window::wrap;
+use crate::models::{KeyframePose, TransitionRequest};
+use crate::motion::features::{BODY_VELOCITIES, FACING, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::{PARTS, Skeleton};
+
+/// A keyframe and where it stands in the result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimedKeyframe {
+    /// Frame of the result.
+    pub time: usize,
+    pub keyframe: KeyframePose,
+}
+
+/// Where a keyframe comes from and where it goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KeyframeSource<'a> {
+    pub clip: &'a DanceClip,
+    /// Frame of the clip at its rate.
+    pub frame: usize,
+    /// Frame of the result.
+    pub time: usize,
+}
+
+/// Keyframes k_0 .. k_K with K transitions between them, and the controls of all frames from the first to the last.
+///
+/// F = time of the last keyframe + 1 is the number of frames of the result. The controls of [`super::controls`] change one request into
+/// another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SequenceRequest {
+    /// The dance skeleton with constant bones: every keyframe's translations but the root's are these offsets.
+    pub skeleton: Skeleton,
+    /// Seconds from one frame to the next.
+    pub frame_time: f64,
+    /// By ascending time, the first at 0.
+    pub keyframes: Vec<TimedKeyframe>,
+    /// Root positions wanted, `[F, 3]`, cm. A keyframe's root lies on it.
+    pub root_trajectory: Array2<f64>,
+    /// Velocity factors wanted, `[F, 5]`, cm/frame.
+    pub velocity_factors: Array2<f64>,
+}
+
+impl SequenceRequest {
+    /// Keyframes from one or several clips. The first one's dancer dances: keyframes of others are put onto the same bones by their
+    /// joints' rotations, the height of the root scaled by the length of the legs.
+    ///
+    /// The root goes along a smooth curve through the keyframes' roots, and the velocity factors evenly from each keyframe's to the next one's.
+    /// Between two keyframes of one clip in its order the dancer turns as often as there; else the shorter way.
+    ///
+    /// # Errors
+    /// Fewer than two keyframes, times that do not ascend from 0, frames that a clip does not have, dancers whose rotations mean different
+    /// things.
+    pub fn from_keyframes(sources: &[KeyframeSource<'_>]) -> Result<Self, SynthesisError> {
+        let times: Vec<usize> = sources.iter().map(|source| source.time).collect();
+        check_times(&times)?;
+        let poses: Vec<KeyframePose> = sources
+            .iter()
+            .map(|source| keyframe_of(source.clip, source.frame))
+            .collect::<Result<_, _>>()?;
+        let dancer = &sources[0].clip.clip;
+        let skeleton = bones_of(&dancer.skeleton, &poses[0].pose);
+        let mut keyframes: Vec<TimedKeyframe> = Vec::with_capacity(sources.len());
+        let mut shift = wrap(poses[0].features[FACING.start]) - poses[0].features[FACING.start];
+        for (index, (source, mut keyframe)) in sources.iter().zip(poses).enumerate() {
+            if let Some(before) = keyframes.last() {
+                let from = &sources[index - 1];
+                if !(std::ptr::eq(from.clip, source.clip) && from.frame < source.frame) {
+                    let facing = before.keyframe.features[FACING.start];
+                    let own = keyframe.features[FACING.start];
+                    shift = facing + wrap(own - facing) - own;
+                }
+            }
+            keyframe.features[FACING.start] += shift;
+            let keyframe = if source.clip.clip.skeleton == dancer.skeleton {
+                with_constant_bones(keyframe, &skeleton)?
+            } else {
+                retarget(
+                    keyframe,
+                    &source.clip.clip.skeleton,
+                    &skeleton,
+                    &source.clip.name,
+                )?
+            };
+            let time = source.time;
+            keyframes.push(TimedKeyframe { time, keyframe });
+        }
+        let frames = times[times.len() - 1] + 1;
+        let mut request = Self {
+            skeleton,
+            frame_time: dancer.frame_time,
+            keyframes,
+            root_trajectory: Array2::zeros((frames, 3)),
+            velocity_factors: Array2::zeros((frames, PARTS)),
+        };
+        request.root_trajectory = rows_of(&timed_curve(&times, &request.keyframe_roots()));
+        request.velocity_factors = request.velocity_between_keyframes();
+        Ok(request)
+    }
+
+    /// Frames `frames` (ascending, at the clip's rate) of a recorded clip as keyframes, its root trajectory and velocity factors as
+    /// controls; frame `frames[0]` becomes frame 0 of the result. Nothing else of the recorded motion goes in.
+    ///
+    /// # Errors
+    /// As [`SequenceRequest::from_keyframes`].
+    pub fn from_clip(clip: &DanceClip, frames: &[usize]) -> Result<Self, SynthesisError> {
+        let first = frames.first().copied().unwrap_or(0);
+        if let Some(pair) = frames.windows(2).find(|pair| pair[1] <= pair[0]) {
+            let (before, time) = (pair[0], pair[1]);
+            return Err(SynthesisError::Order { before, time });
+        }
+        let sources: Vec<KeyframeSource> = frames
+            .iter()
+            .map(|&frame| KeyframeSource {
+                clip,
+                frame,
+                time: frame - first,
+            })
+            .collect();
+        let mut request = Self::from_keyframes(&sources)?;
+        let rows = clip.features.slice(s![first..first + request.frames(), ..]);
+        request.root_trajectory = rows.slice(s![.., ROOT_POSITION]).to_owned();
+        request.velocity_factors = rows.slice(s![.., VELOCITY_FACTORS]).to_owned();
+        Ok(request)
+    }
+
+    /// F, the number of frames of the result.
+    pub fn frames(&self) -> usize {
+        self.keyframes.last().map_or(0, |last| last.time + 1)
+    }
+
+    /// Frames of the keyframes in the result.
+    pub fn times(&self) -> Vec<usize> {
+        self.keyframes
+            .iter()
+            .map(|keyframe| keyframe.time)
+            .collect()
+    }
+
+    /// Checks that the parts fit together; what concerns single transitions is checked by [`TransitionRequest::check`].
+    ///
+    /// # Errors
+    /// Fewer than two keyframes, times that do not ascend from 0, controls with another number of rows than F.
+    pub fn check(&self) -> Result<(), SynthesisError> {
+        let times = self.times();
+        check_times(&times)?;
+        let expected = self.frames();
+        for (what, found) in [
+            ("the root trajectory", self.root_trajectory.nrows()),
+            (
+                "the array of velocity factors",
+                self.velocity_factors.nrows(),
+            ),
+        ] {
+            if found != expected {
+                return Err(SynthesisError::Rows {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The request for the transition to keyframe `index` (from 1 on) that starts from `start`, which stands at the keyframe before.
+    pub(super) fn transition(&self, index: usize, start: KeyframePose) -> TransitionRequest {
+        let (from, to) = (&self.keyframes[index - 1], &self.keyframes[index]);
+        let rows = |of: ArrayView2<f64>| of.slice(s![from.time..=to.time, ..]).to_owned();
+        TransitionRequest {
+            skeleton: self.skeleton.clone(),
+            start,
+            target: to.keyframe.clone(),
+            root_trajectory: rows(self.root_trajectory.view()),
+            velocity_factors: rows(self.velocity_factors.view()),
+        }
+    }
+}
+
+/// Times of keyframes: two or more, ascending from 0.
+pub(super) fn check_times(times: &[usize]) -> Result<(), SynthesisError> {
+    if times.len() < 2 {
+        return Err(SynthesisError::TooFewKeyframes { found: times.len() });
+    }
+    if times[0] != 0 {
+        return Err(SynthesisError::FirstKeyframe { time: times[0] });
+    }
+    for pair in times.windows(2) {
+        if pair[1] <= pair[0] {
+            let (before, time) = (pair[0], pair[1]);
+            return Err(SynthesisError::Order { before, time });
+        }
+    }
+    Ok(())
+}
+
+/// A frame of a clip as a keyframe: its features and its pose.
+///
+/// Frame 0 of a clip has no velocity; it takes that of frame 1, and the velocity factors that go with it.
+///
+/// # Errors
+/// [`SynthesisError::NoFrame`].
+pub fn keyframe_of(clip: &DanceClip, frame: usize) -> Result<KeyframePose, SynthesisError> {
+    let Some(pose) = clip.clip.poses.get(frame).filter(|_| frame < clip.frames()) else {
+        return Err(SynthesisError::NoFrame {
+            clip: clip.name.clone(),
+            frame,
+            last: clip.frames().saturating_sub(1),
+            fps: 1.0 / clip.clip.frame_time,
+        });
+    };
+    let mut features = clip.features.row(frame).to_owned();
+    if frame == 0 && clip.frames() > 1 {
+        let moving = BODY_VELOCITIES.start..VELOCITY_FACTORS.end;
+        features
+            .slice_mut(s![moving.clone()])
+            .assign(&clip.features.slice(s![1, moving]));
+    }
+    Ok(KeyframePose {
+        features,
+        pose: pose.clone(),
+    })
+}

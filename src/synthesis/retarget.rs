@@ -1,0 +1,118 @@
+//! Keyframes onto one skeleton with constant bones.
+
+use glam::DVec3;
+
+use super::SynthesisError;
+use crate::models::KeyframePose;
+use crate::motion::features::{ROOT_POSITION, write_positions};
+use crate::motion::fit::fit_rotations;
+use crate::motion::{Pose, Skeleton};
+
+/// Bones that differ by no more than this are the same, cm.
+const SAME: f64 = 1e-6;
+/// Rest directions of a bone may differ by this between two dancers, rad.
+const REST: f64 = 0.5;
+/// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis stands.
+const LEGS: [usize; 4] = [2, 3, 6, 7];
+
+/// The skeleton with the bones that it has in `pose`: where joints move in their parents' frames, as they stand there.
+pub(super) fn bones_of(skeleton: &Skeleton, pose: &Pose) -> Skeleton {
+    let mut skeleton = skeleton.clone();
+    for (joint, translation) in skeleton.joints.iter_mut().zip(&pose.translations).skip(1) {
+        joint.offset = *translation;
+    }
+    skeleton
+}
+
+/// A keyframe of the same dancer with the skeleton's constant bones: rotations fitted to its positions where joints moved in their
+/// parents' frames, itself where none did.
+pub(super) fn with_constant_bones(
+    mut keyframe: KeyframePose,
+    skeleton: &Skeleton,
+) -> Result<KeyframePose, SynthesisError> {
+    if has_bones(&keyframe.pose, skeleton) {
+        return Ok(keyframe);
+    }
+    let positions = keyframe.pose.world_positions(skeleton);
+    set_bones(&mut keyframe.pose, skeleton);
+    let fit = fit_rotations(skeleton, &[positions], &keyframe.pose).map_err(|source| {
+        SynthesisError::Rotations {
+            from: 0,
+            to: 0,
+            source: Box::new(source),
+        }
+    })?;
+    keyframe.pose.clone_from(&fit.poses[0]);
+    refresh(&mut keyframe, skeleton);
+    Ok(keyframe)
+}
+
+/// A keyframe of another dancer on this skeleton: every joint keeps its rotation, the root's height is scaled by the length of the legs.
+///
+/// `from` is the other dancer's skeleton with constant bones, as `keyframe` has them; `clip` names it in errors.
+///
+/// # Errors
+/// [`SynthesisError::RestPose`]: the two skeletons' bones point in different directions at rest, so that rotations of one mean
+/// nothing on the other.
+pub(super) fn retarget(
+    mut keyframe: KeyframePose,
+    from: &Skeleton,
+    skeleton: &Skeleton,
+    clip: &str,
+) -> Result<KeyframePose, SynthesisError> {
+    if has_bones(&keyframe.pose, skeleton) {
+        return Ok(keyframe);
+    }
+    for (theirs, ours) in from.joints.iter().zip(&skeleton.joints).skip(1) {
+        let bones = theirs.offset.length().min(ours.offset.length());
+        let apart = theirs.offset.angle_between(ours.offset);
+        if bones > 1.0 && apart > REST {
+            return Err(SynthesisError::RestPose {
+                clip: clip.into(),
+                joint: ours.name.clone(),
+                degrees: apart.to_degrees(),
+            });
+        }
+    }
+    let legs = |skeleton: &Skeleton| -> f64 {
+        LEGS.map(|joint| skeleton.joints[joint].offset.length())
+            .iter()
+            .sum()
+    };
+    let (theirs, ours) = (legs(from), legs(skeleton));
+    if theirs > SAME {
+        keyframe.pose.translations[0].y *= ours / theirs;
+    }
+    set_bones(&mut keyframe.pose, skeleton);
+    refresh(&mut keyframe, skeleton);
+    Ok(keyframe)
+}
+
+fn has_bones(pose: &Pose, skeleton: &Skeleton) -> bool {
+    let bones = pose.translations.iter().zip(&skeleton.joints).skip(1);
+    bones
+        .map(|(translation, joint)| translation.distance(joint.offset))
+        .all(|apart| apart <= SAME)
+}
+
+fn set_bones(pose: &mut Pose, skeleton: &Skeleton) {
+    let bones = pose.translations.iter_mut().zip(&skeleton.joints).skip(1);
+    for (translation, joint) in bones {
+        *translation = joint.offset;
+    }
+}
+
+/// p^b and p^r of the keyframe's features from its pose.
+fn refresh(keyframe: &mut KeyframePose, skeleton: &Skeleton) {
+    let positions = keyframe.pose.world_positions(skeleton);
+    let facing = keyframe.features[crate::motion::features::FACING.start];
+    write_positions(&mut keyframe.features.view_mut(), &positions, facing);
+}
+
+/// Moves a keyframe's root to a place, its pose unchanged.
+pub(super) fn move_root(keyframe: &mut KeyframePose, place: DVec3) {
+    keyframe.pose.translations[0] = place;
+    for (column, value) in ROOT_POSITION.zip(place.to_array()) {
+        keyframe.features[column] = value;
+    }
+}
