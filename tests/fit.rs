@@ -1,6 +1,7 @@
 //! Positions to rotations and back.
 
-use std::path::{Path, PathBuf};
+#[path = "common/real_data.rs"]
+mod real_data;
 
 use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, Dataset, Split};
@@ -10,6 +11,7 @@ use keydance::motion::{
     Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, JOINTS, Joint, Pose, Skeleton, features,
 };
 use proptest::prelude::*;
+use real_data::dance_folder;
 
 fn skeleton() -> Skeleton {
     let joints = DANCE_JOINTS
@@ -65,7 +67,7 @@ proptest! {
     #[test]
     fn positions_of_a_pose_are_met_again(speed in 0.0..0.2f64) {
         let clip = clip(12, speed);
-        let fit = fit_rotations(&clip.skeleton, &world(&clip), &clip.poses[0]).unwrap();
+        let fit = fit_rotations(&clip.skeleton, &world(&clip), &clip.poses[0], None).unwrap();
         prop_assert!(fit.max_error < 1e-6, "{}", fit.max_error);
         prop_assert!(fit.mean_error <= fit.max_error);
     }
@@ -77,7 +79,7 @@ proptest! {
         for (joint, noise) in wanted[1].iter_mut().zip(&noise) {
             *joint += DVec3::from(*noise);
         }
-        let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap();
+        let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0], None).unwrap();
         let found = fit.poses[1].world_positions(&clip.skeleton);
         prop_assert!(found[0].distance(wanted[1][0]) < 1e-9);
         for (index, joint) in clip.skeleton.joints.iter().enumerate() {
@@ -104,7 +106,7 @@ proptest! {
 #[test]
 fn a_pose_that_already_fits_keeps_its_rotations() {
     let clip = clip(8, 0.3);
-    let fit = fit_rotations(&clip.skeleton, &world(&clip)[7..], &clip.poses[7]).unwrap();
+    let fit = fit_rotations(&clip.skeleton, &world(&clip)[7..], &clip.poses[7], None).unwrap();
     for (found, expected) in fit.poses[0].rotations.iter().zip(&clip.poses[7].rotations) {
         assert!(found.angle_between(*expected) < 1e-6);
     }
@@ -116,7 +118,7 @@ fn bones_that_are_too_long_are_reported_in_the_error() {
     let mut wanted = world(&clip);
     // The head 5 cm farther along its bone: 5 cm off at one of 24 joints.
     wanted[0][23].y += 5.0;
-    let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap();
+    let fit = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0], None).unwrap();
     assert!((fit.max_error - 5.0).abs() < 1e-9);
     assert!((fit.mean_error - 5.0 / 24.0).abs() < 1e-9);
 }
@@ -126,35 +128,24 @@ fn positions_that_do_not_fit_the_skeleton_are_errors() {
     let clip = clip(3, 0.1);
     let mut wanted = world(&clip);
     wanted[2][5].z = f64::NAN;
-    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap_err();
+    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0], None).unwrap_err();
     assert!(
         error.to_string().contains("frame 2, joint RightUpLeg"),
         "{error}"
     );
     wanted[1].pop();
-    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0]).unwrap_err();
+    let error = fit_rotations(&clip.skeleton, &wanted, &clip.poses[0], None).unwrap_err();
     assert!(
         error.to_string().contains("frame 1 has 23 joints"),
         "{error}"
     );
     let none: [Vec<DVec3>; 0] = [];
-    let error = fit_rotations(&clip.skeleton, &none, &clip.poses[0]).unwrap_err();
+    let error = fit_rotations(&clip.skeleton, &none, &clip.poses[0], None).unwrap_err();
     assert_eq!(error, RotationFitError::NoFrames);
 }
 
-/// The folder with the dance clips: `KEYDANCE_DATA`, else `../shared/data/dance` beside the repository.
-fn dance_data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/dance");
-    let folder = std::env::var_os("KEYDANCE_DATA").map_or_else(beside, PathBuf::from);
-    folder.is_dir().then_some(folder)
-}
-
-#[test]
-fn recorded_dance_is_met_within_a_millimetre() {
-    let Some(folder) = dance_data() else {
-        println!("skipped: no dance clips; set KEYDANCE_DATA to their folder");
-        return;
-    };
+fn recorded_clip() -> Option<Clip> {
+    let folder = dance_folder()?;
     let config = DataConfig {
         split: Split::List {
             train: vec!["Andria_Angry_v1-BVH.bvh".into()],
@@ -163,8 +154,82 @@ fn recorded_dance_is_met_within_a_millimetre() {
         ..DataConfig::default()
     };
     let data = Dataset::load(&folder, &config).unwrap();
-    let clip = &data.train[0].clip;
-    let fit = fit_rotations(&clip.skeleton, &world(clip), &clip.poses[0]).unwrap();
+    Some(data.train[0].clip.clone())
+}
+
+#[test]
+fn recorded_dance_is_met_within_a_millimetre() {
+    let Some(clip) = recorded_clip() else {
+        return;
+    };
+    let fit = fit_rotations(&clip.skeleton, &world(&clip), &clip.poses[0], None).unwrap();
     println!("mean {:.4} cm, max {:.4} cm", fit.mean_error, fit.max_error);
     assert!(fit.max_error < 0.1, "{} cm", fit.max_error);
+}
+
+/// Local rotations of every joint in two runs of poses.
+fn angles<'a>(a: &'a [Pose], b: &'a [Pose]) -> impl Iterator<Item = f64> + 'a {
+    a.iter().zip(b).flat_map(|(a, b)| {
+        let pairs = a.rotations.iter().zip(&b.rotations);
+        pairs.map(|(a, b)| a.angle_between(*b).to_degrees())
+    })
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[(share * (values.len() - 1) as f64) as usize]
+}
+
+#[test]
+fn experiment() {
+    let Some(folder) = dance_folder() else { return };
+    let config = DataConfig::default();
+    let data = Dataset::load(&folder, &config).unwrap();
+    for ends in [false, true] {
+        let (mut off, mut own, mut fitted) = (Vec::new(), Vec::new(), Vec::new());
+        let mut per_joint = vec![Vec::new(); 24];
+        for dance in data.train.iter().step_by(8) {
+            let clip = &dance.clip;
+            let poses = &clip.poses;
+            let world = world(clip);
+            for start in (0..poses.len().saturating_sub(101)).step_by(100) {
+                let range = start + 1..start + 101;
+                let fit = fit_rotations(
+                    &clip.skeleton,
+                    &world[range.clone()],
+                    &poses[start],
+                    ends.then(|| &poses[start + 100]),
+                )
+                .unwrap();
+                assert!(fit.max_error < 0.1);
+                off.extend(angles(&fit.poses, &poses[range.clone()]));
+                for (a, b) in fit.poses.iter().zip(&poses[range.clone()]) {
+                    for j in 0..24 {
+                        per_joint[j]
+                            .push(a.rotations[j].angle_between(b.rotations[j]).to_degrees());
+                    }
+                }
+                own.extend(angles(&poses[range.clone()], &poses[start..]));
+                fitted.extend(angles(&fit.poses[1..], &fit.poses));
+            }
+        }
+        let mean = |v: &Vec<f64>| v.iter().sum::<f64>() / v.len() as f64;
+        println!(
+            "ends {ends}: off mean {:.2} q99 {:.2} max {:.2}",
+            mean(&off),
+            quantile(off.clone(), 0.99),
+            quantile(off.clone(), 1.0)
+        );
+        for q in [0.5, 0.99, 0.999, 1.0] {
+            println!(
+                "  q {q}: own {:.3} fitted {:.3}",
+                quantile(own.clone(), q),
+                quantile(fitted.clone(), q)
+            );
+        }
+        for j in 0..24 {
+            print!("{}:{:.1} ", DANCE_JOINTS[j], mean(&per_joint[j]));
+        }
+        println!();
+    }
 }

@@ -9,11 +9,11 @@ use clap::Args;
 
 use super::clip_choice::ClipChoice;
 use super::evaluation_record::{EvaluatedData, EvaluationRecord};
+use super::subject::Subject;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataConfig, Dataset};
 use crate::evaluation::{Protocol, TableRow, terminal_tables};
-use crate::models::TransitionModel;
 use crate::training::{ExperimentConfig, RunFolder, replace_file};
 
 #[derive(Debug, Args)]
@@ -50,7 +50,13 @@ pub struct EvaluateArgs {
 /// # Errors
 /// The run, its weights or the data cannot be used, or do not fit each other; nothing is written then. A file cannot be written.
 pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
-    let subject = Subject::open(&args)?;
+    let subject = Subject::open(&args.run, &args.set)?;
+    if subject.run.is_some() && args.out.is_some() {
+        anyhow::bail!(
+            "--out is for a config; {} is a run's folder and keeps its scores itself",
+            args.run.display()
+        );
+    }
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
     if !args.other_data {
         subject.check_data(&dataset, &args.data)?;
@@ -104,70 +110,7 @@ impl EvaluateArgs {
     }
 }
 
-/// What is evaluated.
-struct Subject {
-    config: ExperimentConfig,
-    model: Box<dyn TransitionModel>,
-    /// What to call it in the output.
-    what: String,
-    /// The run's folder; none for a config.
-    run: Option<RunFolder>,
-}
-
 impl Subject {
-    fn open(args: &EvaluateArgs) -> anyhow::Result<Self> {
-        let path = &args.run;
-        if !path.is_dir() {
-            let config = ExperimentConfig::load(path, &args.set)?;
-            let threshold = config.data.contact_threshold;
-            let model = config.model.untrained(threshold).with_context(|| {
-                format!(
-                    "{} describes a model that is trained; train it with `keydance train {} --data {} --out RUN_DIR` and \
-                     evaluate RUN_DIR",
-                    path.display(),
-                    path.display(),
-                    args.data.display()
-                )
-            })?;
-            return Ok(Self {
-                what: format!("{} of {}", config.name, path.display()),
-                config,
-                model,
-                run: None,
-            });
-        }
-        if args.out.is_some() {
-            anyhow::bail!(
-                "--out is for a config; {} is a run's folder and keeps its scores itself",
-                path.display()
-            );
-        }
-        let run = RunFolder::open(path);
-        if !run.config_path().exists() {
-            anyhow::bail!(
-                "{} is not a run's folder: it has no {}; `keydance train` makes one",
-                path.display(),
-                file_name(&run.config_path())
-            );
-        }
-        let config = ExperimentConfig::load(&run.config_path(), &args.set)?;
-        let untrained = config.model.untrained(config.data.contact_threshold);
-        let (model, what) = match untrained {
-            Some(model) => (model, format!("{} of {}", config.name, path.display())),
-            None => {
-                let model: Box<dyn TransitionModel> = Box::new(run.trained_model(&config)?);
-                let weights = run.newest_weights()?;
-                (model, format!("{}, {}", config.name, weights.display()))
-            }
-        };
-        Ok(Self {
-            config,
-            model,
-            what,
-            run: Some(run),
-        })
-    }
-
     /// Refuses data that the run was not trained on: its training clips may be test clips there.
     fn check_data(&self, dataset: &Dataset, folder: &Path) -> anyhow::Result<()> {
         let Some(run) = &self.run else {
@@ -226,11 +169,4 @@ impl Subject {
         replace_file(&run.config_path(), self.config.to_toml()?.as_bytes())?;
         Ok(Some(folder))
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
 }

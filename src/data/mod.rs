@@ -3,6 +3,7 @@
 pub mod choreography;
 pub mod config;
 pub mod dataset;
+pub mod ranges;
 pub mod root_frame;
 mod split;
 pub mod standardise;
@@ -12,6 +13,7 @@ pub mod windows;
 pub use config::{DataConfig, Split};
 pub(crate) use dataset::hexadecimal;
 pub use dataset::{DanceClip, DataError, Dataset};
+pub use ranges::DataRanges;
 pub use root_frame::RootFrame;
 pub use standardise::Standardisation;
 pub use window::window_features;

@@ -3,6 +3,9 @@
 /// Number of body parts (M = 5).
 pub const PARTS: usize = 5;
 
+/// Names of the body parts.
+pub const PART_NAMES: [&str; PARTS] = ["trunk", "left_leg", "right_leg", "right_arm", "left_arm"];
+
 /// Joint weights of each body part (figure 4): `(joint of the dance skeleton, weight)`.
 ///
 /// Parts in the order trunk, left leg, right leg, right arm, left arm.

@@ -1,9 +1,9 @@
 //! Feet that stand still where contact is predicted.
 //!
-//! A contact is a run of frames in which heel or toe of a foot is predicted on the ground. There the ankle is held at one place by two-bone
-//! inverse kinematics of the leg, the foot keeps the direction that it had, and before and after the contact the correction comes and
-//! goes along a smooth curve. A contact over a keyframe holds the foot where the keyframe has it; one over several keyframes is split between
-//! them, so that no keyframe changes.
+//! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact the joint is held at one place; before and after,
+//! the correction comes and goes along a smooth curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel
+//! and toe are both held. A run over a keyframe holds the joint where the keyframe has it; one over several keyframes is split between them; near
+//! a keyframe outside the run the correction fades. So no keyframe changes.
 
 use glam::{DQuat, DVec3};
 
@@ -16,8 +16,12 @@ const EASE: usize = 6;
 const SHORTEST: usize = 3;
 /// Gaps in a contact up to this many frames are noise in the labels.
 const GAP: usize = 2;
+/// Corrections below this are none, cm.
+const STILL: f64 = 1e-9;
+/// Bones below this have no direction, cm.
+const SHORTEST_BONE: f64 = 1e-6;
 
-/// Hip, knee, ankle and toe of a leg, and which two contact labels are its.
+/// A leg: hip, knee, ankle and toe, and the contact labels of ankle and toe.
 struct Leg {
     joints: [usize; 4],
     labels: [usize; 2],
@@ -34,7 +38,7 @@ const LEGS: [Leg; 2] = [
     },
 ];
 
-/// Frames `from..to` in which a foot stands, and the frame whose place it keeps.
+/// Frames `from..to` in which a joint stands, and the keyframe among them whose place it keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Stand {
     from: usize,
@@ -42,7 +46,15 @@ struct Stand {
     keyframe: Option<usize>,
 }
 
-/// Pins the feet of `poses`, `[F]`, in the frames of `contacts`; frames in `keyframes` keep their poses.
+/// What holds one joint in every frame.
+struct Hold {
+    /// How far it is moved, `[F]`, cm; already faded.
+    correction: Vec<DVec3>,
+    /// How much it is held, `[F]`, 0 to 1.
+    weight: Vec<f64>,
+}
+
+/// Pins the feet of `poses`, `[F]`, in the frames of `contacts`; frames in `keyframes` (ascending) keep their poses.
 pub(super) fn pin_feet(
     skeleton: &Skeleton,
     poses: &mut [Pose],
@@ -50,19 +62,27 @@ pub(super) fn pin_feet(
     keyframes: &[usize],
 ) {
     for leg in &LEGS {
-        let on: Vec<bool> = contacts
+        let world: Vec<Vec<DVec3>> = poses
             .iter()
-            .map(|labels| leg.labels.iter().any(|&label| labels[label]))
+            .map(|pose| pose.world_positions(skeleton))
             .collect();
-        let ankle: Vec<DVec3> = poses
-            .iter()
-            .map(|pose| pose.world_positions(skeleton)[leg.joints[2]])
-            .collect();
-        let stands = stands(&on, keyframes);
-        let corrections = corrections(&stands, &ankle, keyframes);
-        for (pose, correction) in poses.iter_mut().zip(corrections) {
-            if correction.length() > 1e-9 {
-                move_ankle(skeleton, pose, &leg.joints, correction);
+        let hold = |joint: usize, label: usize| {
+            let on: Vec<bool> = contacts.iter().map(|labels| labels[label]).collect();
+            let path: Vec<DVec3> = world.iter().map(|world| world[joint]).collect();
+            Hold::new(&stands(&on, keyframes), &path, keyframes)
+        };
+        let ankle = hold(leg.joints[2], leg.labels[0]);
+        let toe = hold(leg.joints[3], leg.labels[1]);
+        for (frame, pose) in poses.iter_mut().enumerate() {
+            // A toe that stands alone takes the ankle along.
+            let moved =
+                ankle.correction[frame] + (1.0 - ankle.weight[frame]) * toe.correction[frame];
+            if moved.length() > STILL {
+                move_ankle(skeleton, pose, &leg.joints, moved);
+            }
+            if toe.weight[frame] > 0.0 && (moved - toe.correction[frame]).length() > STILL {
+                let place = world[frame][leg.joints[3]] + toe.correction[frame];
+                aim_foot(skeleton, pose, &leg.joints, place);
             }
         }
     }
@@ -86,14 +106,20 @@ fn stands(on: &[bool], keyframes: &[usize]) -> Vec<Stand> {
             .collect();
         let mut from = from;
         for (index, &keyframe) in within.iter().enumerate() {
+            // From one keyframe's place to the next one's the joint goes in the middle of the way.
             let next = within.get(index + 1);
-            let end = next.map_or(to, |next| (keyframe + next).div_ceil(2));
+            let middle = next.map(|next| (keyframe + next) / 2);
+            let end = middle.map_or(to, |middle| {
+                (middle - EASE.min(middle - keyframe)).max(keyframe + 1)
+            });
             stands.push(Stand {
                 from,
                 to: end,
                 keyframe: Some(keyframe),
             });
-            from = end;
+            if let (Some(middle), Some(&next)) = (middle, next) {
+                from = (middle + EASE).min(next);
+            }
         }
         if within.is_empty() {
             stands.push(Stand {
@@ -106,43 +132,93 @@ fn stands(on: &[bool], keyframes: &[usize]) -> Vec<Stand> {
     stands
 }
 
-/// How far the ankle is moved in each frame, `[F]`, cm.
-fn corrections(stands: &[Stand], ankle: &[DVec3], keyframes: &[usize]) -> Vec<DVec3> {
-    let _ = (stands, keyframes, EASE);
-    vec![DVec3::ZERO; ankle.len()]
+impl Hold {
+    fn new(stands: &[Stand], path: &[DVec3], keyframes: &[usize]) -> Self {
+        let mut hold = Self {
+            correction: vec![DVec3::ZERO; path.len()],
+            weight: vec![0.0; path.len()],
+        };
+        for (index, stand) in stands.iter().enumerate() {
+            let before = index.checked_sub(1).map_or(0, |before| stands[before].to);
+            let after = stands.get(index + 1).map_or(path.len(), |next| next.from);
+            hold.add(stand, before..after, path, keyframes);
+        }
+        hold
+    }
+
+    /// Adds one stand; `room` reaches from the end of the one before to the begin of the next.
+    fn add(
+        &mut self,
+        stand: &Stand,
+        room: std::ops::Range<usize>,
+        path: &[DVec3],
+        keyframes: &[usize],
+    ) {
+        let Stand { from, to, keyframe } = *stand;
+        let place = match keyframe {
+            Some(keyframe) => path[keyframe],
+            None => path[from..to].iter().sum::<DVec3>() / (to - from) as f64,
+        };
+        let (enters, leaves) = (EASE.min(from - room.start), EASE.min(room.end - to));
+        for frame in from - enters..to + leaves {
+            let nearest = frame.clamp(from, to - 1);
+            let eased = match nearest.abs_diff(frame) {
+                0 => 1.0,
+                gone if frame < from => smooth(1.0 - gone as f64 / (enters + 1) as f64),
+                gone => smooth(1.0 - gone as f64 / (leaves + 1) as f64),
+            };
+            let others = keyframes.iter().filter(|other| !(from..to).contains(other));
+            let apart = others.map(|&other| other.abs_diff(frame)).min();
+            let free = apart.map_or(1.0, |apart| smooth(apart as f64 / EASE as f64));
+            let weight = eased * free;
+            self.correction[frame] += weight * (place - path[nearest]);
+            self.weight[frame] += weight;
+        }
+    }
+}
+
+/// From 0 to 1 with velocity and acceleration 0 at both ends.
+fn smooth(share: f64) -> f64 {
+    let s = share.clamp(0.0, 1.0);
+    s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
 /// Moves the ankle by two-bone inverse kinematics; the foot keeps its direction in the world.
-fn move_ankle(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], correction: DVec3) {
+fn move_ankle(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], moved: DVec3) {
     let [hip, knee, ankle, _] = *joints;
     let (positions, rotations) = pose.world(skeleton);
     let upper = positions[knee] - positions[hip];
     let lower = positions[ankle] - positions[knee];
-    let pole = positions[knee] - 0.5 * (positions[hip] + positions[ankle]);
+    if upper.length() < SHORTEST_BONE || lower.length() < SHORTEST_BONE {
+        return;
+    }
     let limb = two_bone(
         positions[hip],
-        positions[ankle] + correction,
+        positions[ankle] + moved,
         upper.length(),
         lower.length(),
-        pole,
+        positions[knee] - 0.5 * (positions[hip] + positions[ankle]),
     );
-    let thigh = DQuat::from_rotation_arc(
-        upper.normalize(),
-        (limb.middle - positions[hip]).normalize(),
-    ) * rotations[hip];
-    let carried = DQuat::from_rotation_arc(
-        upper.normalize(),
-        (limb.middle - positions[hip]).normalize(),
-    );
-    let shin = DQuat::from_rotation_arc(
-        (carried * lower).normalize(),
-        (limb.end - limb.middle).normalize(),
-    ) * carried
-        * rotations[knee];
+    let arc = |from: DVec3, to: DVec3| DQuat::from_rotation_arc(from.normalize(), to.normalize());
+    let swing = arc(upper, limb.middle - positions[hip]);
+    let thigh = swing * rotations[hip];
+    let shin = arc(swing * lower, limb.end - limb.middle) * swing * rotations[knee];
     let parent = skeleton.joints[hip]
         .parent
         .map_or(DQuat::IDENTITY, |parent| rotations[parent]);
     pose.rotations[hip] = (parent.inverse() * thigh).normalize();
     pose.rotations[knee] = (thigh.inverse() * shin).normalize();
     pose.rotations[ankle] = (shin.inverse() * rotations[ankle]).normalize();
+}
+
+/// Turns the foot so that its toe points at a place.
+fn aim_foot(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], place: DVec3) {
+    let [_, knee, ankle, toe] = *joints;
+    let (positions, rotations) = pose.world(skeleton);
+    let (now, wanted) = (positions[toe] - positions[ankle], place - positions[ankle]);
+    if now.length() < SHORTEST_BONE || wanted.length() < SHORTEST_BONE {
+        return;
+    }
+    let turn = DQuat::from_rotation_arc(now.normalize(), wanted.normalize());
+    pose.rotations[ankle] = (rotations[knee].inverse() * turn * rotations[ankle]).normalize();
 }

@@ -12,10 +12,13 @@ mod motion;
 mod request;
 mod retarget;
 mod sequence;
+mod warning;
 
 pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
 pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};
 pub use sequence::{
     CONTACT_LABEL, FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise,
+    trajectory_error,
 };
+pub use warning::{ControlWarning, control_warnings, moved_warnings};

@@ -34,7 +34,12 @@ pub fn transition_motion(
         .map(world_positions)
         .collect();
     let start = &request.start.pose;
-    let fit = fit_rotations(&request.skeleton, &positions, start)?;
+    let fit = fit_rotations(
+        &request.skeleton,
+        &positions,
+        start,
+        Some(&request.target.pose),
+    )?;
     let mut poses = vec![start.clone()];
     poses.extend(fit.poses);
     Ok(SynthesisedMotion {

@@ -123,11 +123,22 @@ impl SequenceRequest {
                 time: frame - first,
             })
             .collect();
-        let mut request = Self::from_keyframes(&sources)?;
-        let rows = clip.features.slice(s![first..first + request.frames(), ..]);
-        request.root_trajectory = rows.slice(s![.., ROOT_POSITION]).to_owned();
-        request.velocity_factors = rows.slice(s![.., VELOCITY_FACTORS]).to_owned();
-        Ok(request)
+        Self::from_keyframes(&sources)?.like(clip, first)
+    }
+
+    /// The same with root trajectory and velocity factors of a clip, from its frame `first` on. Keyframes are not moved.
+    ///
+    /// # Errors
+    /// The clip ends before the last keyframe.
+    pub fn like(mut self, clip: &DanceClip, first: usize) -> Result<Self, SynthesisError> {
+        let end = first + self.frames();
+        if end > clip.frames() {
+            return Err(no_frame(clip, end - 1));
+        }
+        let rows = clip.features.slice(s![first..end, ..]);
+        self.root_trajectory = rows.slice(s![.., ROOT_POSITION]).to_owned();
+        self.velocity_factors = rows.slice(s![.., VELOCITY_FACTORS]).to_owned();
+        Ok(self)
     }
 
     /// F, the number of frames of the result.
@@ -208,12 +219,7 @@ pub(super) fn check_times(times: &[usize]) -> Result<(), SynthesisError> {
 /// [`SynthesisError::NoFrame`].
 pub fn keyframe_of(clip: &DanceClip, frame: usize) -> Result<KeyframePose, SynthesisError> {
     let Some(pose) = clip.clip.poses.get(frame).filter(|_| frame < clip.frames()) else {
-        return Err(SynthesisError::NoFrame {
-            clip: clip.name.clone(),
-            frame,
-            last: clip.frames().saturating_sub(1),
-            fps: 1.0 / clip.clip.frame_time,
-        });
+        return Err(no_frame(clip, frame));
     };
     let mut features = clip.features.row(frame).to_owned();
     if frame == 0 && clip.frames() > 1 {
@@ -226,4 +232,13 @@ pub fn keyframe_of(clip: &DanceClip, frame: usize) -> Result<KeyframePose, Synth
         features,
         pose: pose.clone(),
     })
+}
+
+fn no_frame(clip: &DanceClip, frame: usize) -> SynthesisError {
+    SynthesisError::NoFrame {
+        clip: clip.name.clone(),
+        frame,
+        last: clip.frames().saturating_sub(1),
+        fps: 1.0 / clip.clip.frame_time,
+    }
 }

@@ -35,7 +35,7 @@ pub(super) fn with_constant_bones(
     }
     let positions = keyframe.pose.world_positions(skeleton);
     set_bones(&mut keyframe.pose, skeleton);
-    let fit = fit_rotations(skeleton, &[positions], &keyframe.pose).map_err(|source| {
+    let fit = fit_rotations(skeleton, &[positions], &keyframe.pose, None).map_err(|source| {
         SynthesisError::Rotations {
             from: 0,
             to: 0,

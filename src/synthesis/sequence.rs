@@ -82,6 +82,17 @@ impl Sequence {
     }
 }
 
+/// How far the root of a sequence is from the trajectory that was asked for, mean and maximum over its frames, cm.
+pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64, f64) {
+    let asked = request.root_trajectory.rows().into_iter();
+    let distances: Vec<f64> = asked
+        .zip(&sequence.clip.poses)
+        .map(|(row, pose)| pose.translations[0].distance(DVec3::new(row[0], row[1], row[2])))
+        .collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    (mean, distances.iter().copied().fold(0.0, f64::max))
+}
+
 /// Generates the transitions of a request one after another, each from what was generated before it, and makes them one clip `name`.
 ///
 /// Each transition starts from the last frame of the one before after that was bent onto its keyframe; the features it starts from are
@@ -121,14 +132,17 @@ pub fn synthesise(
             }
         };
         let positions: Vec<_> = frames.rows().into_iter().map(world_positions).collect();
-        let fit =
-            fit_rotations(&request.skeleton, &positions, &asked.start.pose).map_err(|source| {
-                SynthesisError::Rotations {
-                    from,
-                    to,
-                    source: Box::new(source),
-                }
-            })?;
+        let fit = fit_rotations(
+            &request.skeleton,
+            &positions,
+            &asked.start.pose,
+            Some(&asked.target.pose),
+        )
+        .map_err(|source| SynthesisError::Rotations {
+            from,
+            to,
+            source: Box::new(source),
+        })?;
         fits.push((positions.len(), fit.mean_error, fit.max_error));
         misses.push(miss(
             to,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::ExperimentConfig;
 use super::schedule::Schedule;
-use crate::data::{DanceClip, Dataset};
+use crate::data::{DanceClip, DataRanges, Dataset};
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +48,9 @@ pub struct Manifest {
     pub train: Part,
     pub test: Part,
     pub data_digest: String,
+    /// Bounds of the controls in the training clips; runs of earlier versions have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub data_ranges: Option<DataRanges>,
     /// Weights in all parameters together.
     pub parameters: usize,
     /// SHA-256 of the weights (see [`crate::models::weights::digest`]), once finished.
@@ -98,6 +101,7 @@ impl Manifest {
             train: Part::of(&dataset.train),
             test: Part::of(&dataset.test),
             data_digest: dataset.digest.clone(),
+            data_ranges: DataRanges::of(dataset.train.iter().map(|clip| clip.features.view())),
             parameters,
             weights_digest: None,
         }

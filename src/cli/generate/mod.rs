@@ -1,0 +1,86 @@
+//! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between them as BVH.
+
+mod keyframes;
+mod points;
+mod summary;
+mod table;
+mod trajectory;
+mod velocity;
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::evaluation_record::write_json;
+use super::subject::Subject;
+use crate::motion::Clip;
+use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
+use crate::synthesis::{SynthesisOptions, control_warnings, synthesise};
+use keyframes::{KeyframeArgs, Keyframes};
+use summary::Summary;
+use trajectory::TrajectoryArgs;
+use velocity::VelocityArgs;
+
+/// Generates the dance between keyframes and writes it as BVH.
+///
+/// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a file at another rate is resampled first, so frame 120 of the
+/// file's own 120 a second is frame 30 here. The result passes through every keyframe. Keyframes of several dancers are put onto the first one's bones.
+#[derive(Debug, Args)]
+pub struct GenerateArgs {
+    /// Folder of a run, or the config of a model that needs no training
+    #[arg(value_name = "RUN_DIR_OR_CONFIG")]
+    run: PathBuf,
+    #[command(flatten)]
+    keyframes: KeyframeArgs,
+    /// Where to write the motion
+    #[arg(long, value_name = "FILE.bvh")]
+    out: PathBuf,
+    #[command(flatten)]
+    trajectory: TrajectoryArgs,
+    #[command(flatten)]
+    velocity: VelocityArgs,
+    /// Pin the feet where the model predicts contact
+    #[arg(long)]
+    foot_cleanup: bool,
+    /// Write what is printed here, too, as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// # Errors
+/// The run, a file or a control cannot be used, or they do not fit each other; nothing is written then. A file cannot be written.
+pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
+    let subject = Subject::open(&args.run, &[])?;
+    let keyframes = Keyframes::read(&args.keyframes, &subject.config.data)?;
+    let request = keyframes.request(&args.keyframes)?;
+    let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
+    let request = args.velocity.apply(request, &keyframes)?;
+    warnings.extend(control_warnings(&request, subject.ranges.as_ref()));
+    for warning in &warnings {
+        eprintln!("warning: {warning}");
+    }
+    let options = SynthesisOptions {
+        foot_cleanup: args.foot_cleanup,
+    };
+    let name = args.out.file_name().unwrap_or_default().to_string_lossy();
+    let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
+    let document = document(&sequence.clip, keyframes.channels())?;
+    bvh::write(&args.out, &document)?;
+    let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
+    if let Some(path) = &args.json {
+        write_json(path, &summary)?;
+    }
+    write!(std::io::stdout(), "{summary}{}\n", args.out.display())?;
+    Ok(())
+}
+
+/// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.
+fn document(clip: &Clip, channels: Option<&[Vec<Channel>]>) -> anyhow::Result<Bvh> {
+    let channels = match channels {
+        Some(channels) => channels.to_vec(),
+        None => channel_layout(clip, [Axis::Z, Axis::X, Axis::Y]),
+    };
+    Bvh::from_clip(clip, channels).context("the motion cannot be written")
+}

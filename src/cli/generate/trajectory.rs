@@ -1,0 +1,120 @@
+//! Where the root goes: `--trajectory`, `--trajectory-through`, `--turn`, `--scale`, `--raise`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+
+use super::keyframes::Keyframes;
+use super::{points, table};
+use crate::synthesis::controls::{Speed, smooth_curve};
+use crate::synthesis::{ControlWarning, SequenceRequest, moved_warnings};
+
+#[derive(Debug, Args)]
+pub struct TrajectoryArgs {
+    /// Root trajectory from a CSV file with the columns frame,x,y,z (cm), a row for every frame of the result; keyframes are moved onto it
+    /// [default: --motion's, else a smooth curve through the keyframes]
+    #[arg(long, value_name = "FILE.csv")]
+    trajectory: Option<PathBuf>,
+    /// Root trajectory along a smooth curve through points (cm) "x,z; x,z; ..." or "x,y,z; ...", from the first frame to the last; without y the root
+    /// keeps the heights that it would have had. Keyframes are moved onto it
+    #[arg(long, value_name = "POINTS", value_parser = points::parse, allow_hyphen_values = true, conflicts_with = "trajectory")]
+    trajectory_through: Option<points::Points>,
+    /// How the curve through points is timed
+    #[arg(long, value_enum, requires = "trajectory_through", default_value_t)]
+    timing: Timing,
+    /// Turn trajectory and keyframes about the vertical through the first keyframe, degrees (counterclockwise from above)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    turn: Option<f64>,
+    /// Make the trajectory's way this many times as large, from the first keyframe on; heights stay, keyframes go along
+    #[arg(long, value_name = "S")]
+    scale: Option<f64>,
+    /// Raise the trajectory between the keyframes by up to this, cm; below 0: lower it. Keyframes keep their heights
+    #[arg(long, value_name = "CM", allow_hyphen_values = true)]
+    raise: Option<f64>,
+}
+
+/// How fast the root goes along a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Timing {
+    /// At one speed
+    #[default]
+    Constant,
+    /// In proportion to the speed of the trajectory that the curve replaces: that of --motion
+    Clip,
+}
+
+impl TrajectoryArgs {
+    /// The request under these controls, and warnings of keyframes that were moved.
+    ///
+    /// # Errors
+    /// A file or number that cannot be used.
+    pub fn apply(
+        &self,
+        mut request: SequenceRequest,
+        keyframes: &Keyframes,
+    ) -> anyhow::Result<(SequenceRequest, Vec<ControlWarning>)> {
+        for (flag, value) in [
+            ("turn", self.turn),
+            ("scale", self.scale),
+            ("raise", self.raise),
+        ] {
+            if value.is_some_and(|value| value.is_nan() || value.abs() > 1e5) {
+                anyhow::bail!(
+                    "--{flag} {}: expected a number of at most 100000",
+                    value.unwrap_or(0.0)
+                );
+            }
+        }
+        let trajectory = if let Some(path) = &self.trajectory {
+            table::read(path, &["x", "y", "z"], request.frames())?
+        } else if let Some(points) = &self.trajectory_through {
+            if self.timing == Timing::Clip && keyframes.motion().is_none() {
+                anyhow::bail!(
+                    "--timing clip takes the speed of --motion; give --motion, or --timing constant"
+                );
+            }
+            self.drawn(points, &request)
+        } else {
+            request.root_trajectory.clone()
+        };
+        let (placed, moved) = request.on_trajectory(trajectory)?;
+        let warnings = moved_warnings(&placed, &moved);
+        request = placed;
+        if let Some(degrees) = self.turn {
+            request = request.turned(degrees.to_radians());
+        }
+        if let Some(scale) = self.scale {
+            request = request.scaled(scale)?;
+        }
+        if let Some(height) = self.raise {
+            request = request.raised(height);
+        }
+        Ok((request, warnings))
+    }
+
+    fn drawn(&self, points: &points::Points, request: &SequenceRequest) -> ndarray::Array2<f64> {
+        let old = &request.root_trajectory;
+        let speed = match self.timing {
+            Timing::Constant => Speed::Constant,
+            Timing::Clip => Speed::Like(
+                (1..old.nrows())
+                    .map(|frame| {
+                        let (x, z) = (0, 2);
+                        let step = |axis: usize| old[[frame, axis]] - old[[frame - 1, axis]];
+                        step(x).hypot(step(z))
+                    })
+                    .collect(),
+            ),
+        };
+        let path: Vec<DVec3> = smooth_curve(&points.points, old.nrows(), &speed);
+        let mut trajectory = old.clone();
+        for (mut row, point) in trajectory.rows_mut().into_iter().zip(path) {
+            (row[0], row[2]) = (point.x, point.z);
+            if points.with_heights {
+                row[1] = point.y;
+            }
+        }
+        trajectory
+    }
+}

@@ -1,0 +1,92 @@
+//! The model that a command works with: a trained run's, or one that needs no training.
+
+use std::path::Path;
+
+use anyhow::Context as _;
+
+use crate::data::DataRanges;
+use crate::models::TransitionModel;
+use crate::training::{ExperimentConfig, RunFolder};
+
+pub struct Subject {
+    pub config: ExperimentConfig,
+    pub model: Box<dyn TransitionModel>,
+    /// What to call it in the output.
+    pub what: String,
+    /// The run's folder; none for a config.
+    pub run: Option<RunFolder>,
+    /// Bounds of the controls in what the model was trained on; none without training.
+    pub ranges: Option<DataRanges>,
+}
+
+impl Subject {
+    /// Opens a run's folder, or the config of a model that needs no training; `set` overrides keys of the config.
+    ///
+    /// # Errors
+    /// There is no such run or config, its model is not trained, or its weights are damaged.
+    pub fn open(path: &Path, set: &[String]) -> anyhow::Result<Self> {
+        if !path.is_dir() {
+            let config = ExperimentConfig::load(path, set)?;
+            let threshold = config.data.contact_threshold;
+            let model = config.model.untrained(threshold).with_context(|| {
+                format!(
+                    "{} describes a model that is trained; train it with `keydance train {} --data DIR --out RUN_DIR` and \
+                     give RUN_DIR instead",
+                    path.display(),
+                    path.display(),
+                )
+            })?;
+            return Ok(Self {
+                what: format!("{} of {}", config.name, path.display()),
+                config,
+                model,
+                run: None,
+                ranges: None,
+            });
+        }
+        let run = RunFolder::open(path);
+        if !run.config_path().exists() {
+            anyhow::bail!(
+                "{} is not a run's folder: it has no {}; `keydance train` makes one",
+                path.display(),
+                file_name(&run.config_path())
+            );
+        }
+        let config = ExperimentConfig::load(&run.config_path(), set)?;
+        let untrained = config.model.untrained(config.data.contact_threshold);
+        let (model, what, ranges) = match untrained {
+            Some(model) => (
+                model,
+                format!("{} of {}", config.name, path.display()),
+                None,
+            ),
+            None => {
+                let model = run.trained_model(&config)?;
+                let saved = run.manifest()?.and_then(|manifest| manifest.data_ranges);
+                let ranges =
+                    saved.unwrap_or_else(|| DataRanges::from_statistics(model.standardisation()));
+                let weights = run.newest_weights()?;
+                let what = format!("{}, {}", config.name, weights.display());
+                (
+                    Box::new(model) as Box<dyn TransitionModel>,
+                    what,
+                    Some(ranges),
+                )
+            }
+        };
+        Ok(Self {
+            config,
+            model,
+            what,
+            run: Some(run),
+            ranges,
+        })
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}

@@ -1,0 +1,182 @@
+//! Controls that contradict each other or go beyond what a model has seen.
+
+use std::fmt;
+
+use ndarray::ArrayView1;
+
+use super::SequenceRequest;
+use crate::data::DataRanges;
+use crate::motion::PART_NAMES;
+
+/// The longest transition of the paper, frames.
+const LONGEST: usize = 250;
+/// A root that a keyframe was moved by more than this is worth a word, cm.
+const MOVED: f64 = 1.0;
+
+/// A control out of range; its `Display` says by how much.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ControlWarning {
+    RootSpeed {
+        frame: usize,
+        asked: f64,
+        bound: f64,
+        frames: usize,
+    },
+    RootHeight {
+        frame: usize,
+        asked: f64,
+        bound: f64,
+        frames: usize,
+    },
+    VelocityFactor {
+        part: usize,
+        frame: usize,
+        asked: f64,
+        bound: f64,
+        frames: usize,
+    },
+    Length {
+        from: usize,
+        to: usize,
+    },
+    /// The trajectory misses a keyframe's root, which is moved onto it.
+    Moved {
+        time: usize,
+        distance: f64,
+    },
+}
+
+impl fmt::Display for ControlWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::RootSpeed {
+                frame,
+                asked,
+                bound,
+                frames,
+            } => write!(
+                f,
+                "the root trajectory goes {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's fastest ({bound:.1} in 99.9 % of \
+                 its frames); too fast in {frames} frames",
+                asked / bound
+            ),
+            Self::RootHeight {
+                frame,
+                asked,
+                bound,
+                frames,
+            } => write!(
+                f,
+                "the root trajectory is at {asked:.0} cm height at frame {frame}, {:.0} cm {} the training data's {} ({bound:.0} in 99.9 % of its \
+                 frames); so in {frames} frames",
+                (asked - bound).abs(),
+                if asked > bound { "above" } else { "below" },
+                if asked > bound { "highest" } else { "lowest" },
+            ),
+            Self::VelocityFactor {
+                part,
+                frame,
+                asked,
+                bound,
+                frames,
+            } => write!(
+                f,
+                "the velocity factor of {} is {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's highest ({bound:.1} in 99.9 % of \
+                 its frames); too high in {frames} frames",
+                PART_NAMES[part],
+                asked / bound
+            ),
+            Self::Length { from, to } => write!(
+                f,
+                "the transition from frame {from} to {to} has {} frames; beyond {LONGEST} dances repeat themselves",
+                to - from
+            ),
+            Self::Moved { time, distance } => write!(
+                f,
+                "the root trajectory misses the root of the keyframe at frame {time} by {distance:.1} cm; the keyframe is moved onto it"
+            ),
+        }
+    }
+}
+
+/// What a model trained on data with these ranges has not seen, and transitions that are longer than any sense: one warning a kind.
+pub fn control_warnings(
+    request: &SequenceRequest,
+    ranges: Option<&DataRanges>,
+) -> Vec<ControlWarning> {
+    let mut warnings = Vec::new();
+    for pair in request.times().windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        if to - from > LONGEST {
+            warnings.push(ControlWarning::Length { from, to });
+        }
+    }
+    let Some(ranges) = ranges else {
+        return warnings;
+    };
+    let root = &request.root_trajectory;
+    let speeds = (0..root.nrows()).map(|frame| match frame.checked_sub(1) {
+        None => 0.0,
+        Some(before) => distance(root.row(before), root.row(frame)),
+    });
+    if let Some((frame, asked, frames)) = beyond(speeds, ranges.root_speed) {
+        warnings.push(ControlWarning::RootSpeed {
+            frame,
+            asked,
+            bound: ranges.root_speed,
+            frames,
+        });
+    }
+    let [lowest, highest] = ranges.root_height;
+    let heights = root.column(1);
+    if let Some((frame, asked, frames)) = beyond(heights.iter().copied(), highest) {
+        warnings.push(ControlWarning::RootHeight {
+            frame,
+            asked,
+            bound: highest,
+            frames,
+        });
+    }
+    if let Some((frame, depth, frames)) = beyond(heights.iter().map(|height| -height), -lowest) {
+        warnings.push(ControlWarning::RootHeight {
+            frame,
+            asked: -depth,
+            bound: lowest,
+            frames,
+        });
+    }
+    for (part, &bound) in ranges.velocity_factors.iter().enumerate() {
+        let factors = request.velocity_factors.column(part);
+        if let Some((frame, asked, frames)) = beyond(factors.iter().copied(), bound) {
+            warnings.push(ControlWarning::VelocityFactor {
+                part,
+                frame,
+                asked,
+                bound,
+                frames,
+            });
+        }
+    }
+    warnings
+}
+
+/// Warnings of keyframes that were moved onto a trajectory by these distances (cm), in their order.
+pub fn moved_warnings(request: &SequenceRequest, moved: &[f64]) -> Vec<ControlWarning> {
+    let times = request.times();
+    let far = times.into_iter().zip(moved.iter().copied());
+    far.filter(|&(_, distance)| distance > MOVED)
+        .map(|(time, distance)| ControlWarning::Moved { time, distance })
+        .collect()
+}
+
+/// The largest value beyond a bound, its frame, and how many values are.
+fn beyond(values: impl Iterator<Item = f64>, bound: f64) -> Option<(usize, f64, usize)> {
+    let beyond: Vec<(usize, f64)> = values.enumerate().filter(|(_, x)| *x > bound).collect();
+    let largest = beyond.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((largest.0, largest.1, beyond.len()))
+}
+
+fn distance(a: ArrayView1<f64>, b: ArrayView1<f64>) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
+}
