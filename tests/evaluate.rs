@@ -98,7 +98,10 @@ fn the_json_has_every_score_at_every_length_and_their_averages() {
         keys.sort_unstable();
         keys
     };
-    assert_eq!(keys(&scores), ["art", "avf", "lrp", "windows"]);
+    assert_eq!(
+        keys(&scores),
+        ["art", "avf", "foot_skate", "lrp", "windows"]
+    );
     assert_eq!(keys(&scores["windows"]), ["10", "100", "150", "50"]);
     // Starts every ceil(0.1 (N + 1)) frames in two clips of 180.
     for (length, windows) in [
@@ -109,7 +112,7 @@ fn the_json_has_every_score_at_every_length_and_their_averages() {
     ] {
         assert_eq!(scores["windows"][length], windows, "N = {length}");
     }
-    for name in ["lrp", "avf", "art"] {
+    for name in ["lrp", "avf", "art", "foot_skate"] {
         let score = &scores[name];
         assert_eq!(keys(score), ["10", "100", "150", "50", "avg"]);
         let of = |key: &str| score[key].as_f64().unwrap();

@@ -167,69 +167,102 @@ fn recorded_dance_is_met_within_a_millimetre() {
     assert!(fit.max_error < 0.1, "{} cm", fit.max_error);
 }
 
-/// Local rotations of every joint in two runs of poses.
-fn angles<'a>(a: &'a [Pose], b: &'a [Pose]) -> impl Iterator<Item = f64> + 'a {
-    a.iter().zip(b).flat_map(|(a, b)| {
+/// Angles (degrees) between the local rotations of every joint in two runs of poses.
+fn angles(a: &[Pose], b: &[Pose]) -> Vec<f64> {
+    let pairs = a.iter().zip(b).flat_map(|(a, b)| {
         let pairs = a.rotations.iter().zip(&b.rotations);
         pairs.map(|(a, b)| a.angle_between(*b).to_degrees())
-    })
+    });
+    pairs.collect()
 }
 
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[(share * (values.len() - 1) as f64) as usize]
 }
 
 #[test]
-fn experiment() {
-    let Some(folder) = dance_folder() else { return };
-    let config = DataConfig::default();
-    let data = Dataset::load(&folder, &config).unwrap();
-    for ends in [false, true] {
-        let (mut off, mut own, mut fitted) = (Vec::new(), Vec::new(), Vec::new());
-        let mut per_joint = vec![Vec::new(); 24];
-        for dance in data.train.iter().step_by(8) {
-            let clip = &dance.clip;
-            let poses = &clip.poses;
-            let world = world(clip);
-            for start in (0..poses.len().saturating_sub(101)).step_by(100) {
-                let range = start + 1..start + 101;
-                let fit = fit_rotations(
-                    &clip.skeleton,
-                    &world[range.clone()],
-                    &poses[start],
-                    ends.then(|| &poses[start + 100]),
-                )
-                .unwrap();
-                assert!(fit.max_error < 0.1);
-                off.extend(angles(&fit.poses, &poses[range.clone()]));
-                for (a, b) in fit.poses.iter().zip(&poses[range.clone()]) {
-                    for j in 0..24 {
-                        per_joint[j]
-                            .push(a.rotations[j].angle_between(b.rotations[j]).to_degrees());
-                    }
-                }
-                own.extend(angles(&poses[range.clone()], &poses[start..]));
+fn fitted_rotations_of_recorded_dance_change_no_faster_than_the_recorded_ones() {
+    let Some(clip) = recorded_clip() else {
+        return;
+    };
+    const N: usize = 100;
+    let (poses, world) = (&clip.poses, world(&clip));
+    let (mut recorded, mut fitted, mut off) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
+    for start in (0..poses.len() - N).step_by(N) {
+        let frames = start + 1..start + N + 1;
+        let wanted = &world[frames.clone()];
+        for (off, end) in off.iter_mut().zip([None, Some(&poses[start + N])]) {
+            let fit = fit_rotations(&clip.skeleton, wanted, &poses[start], end).unwrap();
+            assert!(fit.max_error < 0.1, "{} cm", fit.max_error);
+            off.extend(angles(&fit.poses, &poses[frames.clone()]));
+            if end.is_some() {
                 fitted.extend(angles(&fit.poses[1..], &fit.poses));
             }
         }
-        let mean = |v: &Vec<f64>| v.iter().sum::<f64>() / v.len() as f64;
-        println!(
-            "ends {ends}: off mean {:.2} q99 {:.2} max {:.2}",
-            mean(&off),
-            quantile(off.clone(), 0.99),
-            quantile(off.clone(), 1.0)
+        recorded.extend(angles(&poses[start + 2..=start + N], &poses[start + 1..]));
+    }
+    for share in [0.5, 0.99, 0.999, 1.0] {
+        let (found, own) = (quantile(&mut fitted, share), quantile(&mut recorded, share));
+        println!("{share}: fitted {found:.2} degrees a frame, recorded {own:.2}");
+        assert!(found <= own, "{share}: {found} {own}");
+    }
+    let [alone, between] = off.map(|angles| angles.iter().sum::<f64>() / angles.len() as f64);
+    println!(
+        "from the recorded rotations {alone:.2} degrees in the mean, {between:.2} with the last pose known"
+    );
+    assert!(between < alone, "{between} {alone}");
+}
+
+#[test]
+fn a_hand_turns_evenly_from_one_keyframe_to_the_next() {
+    let still = clip(11, 0.0);
+    let mut end = still.poses[10].clone();
+    end.rotations[17] = DQuat::from_rotation_x(1.0);
+    let fit = fit_rotations(
+        &still.skeleton,
+        &world(&still)[1..],
+        &still.poses[0],
+        Some(&end),
+    );
+    for (frame, pose) in fit.unwrap().poses.iter().enumerate() {
+        let expected = DQuat::from_rotation_x((frame + 1) as f64 / 10.0);
+        assert!(
+            pose.rotations[17].angle_between(expected) < 1e-6,
+            "frame {frame}"
         );
-        for q in [0.5, 0.99, 0.999, 1.0] {
-            println!(
-                "  q {q}: own {:.3} fitted {:.3}",
-                quantile(own.clone(), q),
-                quantile(fitted.clone(), q)
-            );
-        }
-        for j in 0..24 {
-            print!("{}:{:.1} ", DANCE_JOINTS[j], mean(&per_joint[j]));
-        }
-        println!();
+    }
+}
+
+#[test]
+fn a_bent_elbow_shows_how_the_upper_arm_is_turned() {
+    let mut bent = clip(41, 0.0);
+    for (time, pose) in bent.poses.iter_mut().enumerate() {
+        // The upper arm turns about itself, which only the forearm shows.
+        pose.rotations[15] = DQuat::from_rotation_y(0.05 * time as f64);
+        pose.rotations[16] = DQuat::from_rotation_x(1.5);
+    }
+    let fit = fit_rotations(&bent.skeleton, &world(&bent)[1..], &bent.poses[0], None).unwrap();
+    let (found, expected) = (&fit.poses[39].rotations, &bent.poses[40].rotations);
+    assert!(found[15].angle_between(expected[15]) < 0.1);
+}
+
+#[test]
+fn the_spine_shares_what_the_shoulders_are_turned() {
+    let mut turned = clip(2, 0.0);
+    for joint in 9..14 {
+        turned.poses[1].rotations[joint] = DQuat::from_rotation_y(0.1);
+    }
+    let fit = fit_rotations(
+        &turned.skeleton,
+        &world(&turned)[1..],
+        &turned.poses[0],
+        None,
+    )
+    .unwrap();
+    for joint in 9..14 {
+        let expected = DQuat::from_rotation_y(0.1);
+        let off = fit.poses[0].rotations[joint].angle_between(expected);
+        assert!(off < 1e-6, "{}: {off}", DANCE_JOINTS[joint]);
     }
 }

@@ -88,6 +88,8 @@ fn the_root_moves_the_trunk_factor() {
 #[test]
 fn a_window_exactly_at_a_threshold_does_not_count() {
     let window = |velocity_factor, root| WindowScores {
+        foot_travel: 0.0,
+        foot_contacts: 0,
         body_position: 2.0,
         velocity_factor,
         root,
@@ -328,6 +330,7 @@ fn the_json_has_lengths_as_keys_and_avg_and_reads_back() {
         lrp: scores([13.5, 124.5]),
         avf: scores([0.5, 0.25]),
         art: scores([1.0, 1.0]),
+        foot_skate: None,
         windows: BTreeMap::from([(10, 7), (150, 3)]),
     };
     let json = serde_json::to_string(&evaluation).unwrap();

@@ -22,6 +22,7 @@ fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> Ta
             lrp: scores(lrp),
             avf: scores(&shares),
             art: scores(&shares),
+            foot_skate: None,
             windows: lengths
                 .iter()
                 .map(|&length| (length, 1000 / length))

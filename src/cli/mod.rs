@@ -4,6 +4,7 @@ mod bench_generate;
 mod bench_layers;
 mod bench_step;
 mod bvh;
+mod choreography;
 mod clip_choice;
 mod demo;
 mod evaluate;
@@ -46,6 +47,8 @@ enum Command {
     BenchLayers(bench_layers::BenchLayersArgs),
     /// Time a training step
     BenchStep(bench_step::BenchStepArgs),
+    /// Write generated dance clips as BVH files
+    Choreography(choreography::ChoreographyArgs),
     Demo(demo::DemoArgs),
     /// Look into BVH files
     Bvh(bvh::BvhArgs),
@@ -76,6 +79,7 @@ impl Cli {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
             Command::BenchLayers(args) => bench_layers::run(args)?,
             Command::BenchStep(args) => bench_step::run(args)?,
+            Command::Choreography(args) => choreography::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Bvh(args) => bvh::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,

@@ -5,7 +5,11 @@ use std::ops::Range;
 use ndarray::{ArrayView2, s};
 
 use crate::models::{ModelError, Transition};
-use crate::motion::features::{BODY_POSITIONS, FACING, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::contact::FOOT_JOINTS;
+use crate::motion::features::{
+    BODY_POSITIONS, CONTACTS, FACING, FEATURES, ROOT_POSITION, VELOCITY_FACTORS,
+};
+use crate::motion::placement::world_positions;
 use crate::motion::{PARTS, velocity_factors};
 
 /// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by side in a frame.
@@ -20,6 +24,10 @@ pub struct WindowScores {
     pub velocity_factor: f64,
     /// g_r, eq. 16: mean over frames of `||p~^r - p^^r||_2`, cm.
     pub root: f64,
+    /// How far foot joints move in the world in the frames in which the recorded ones are in contact, summed, cm.
+    pub foot_travel: f64,
+    /// Number of these: foot joints and frames.
+    pub foot_contacts: usize,
 }
 
 /// Measures a prediction against the recorded window.
@@ -28,6 +36,10 @@ pub struct WindowScores {
 /// were asked for (p^^r and f^). `predicted`: N frames, k1 + 1 to k2. The velocity factors f~ (eq. 1) are those of the differences of
 /// predicted positions, p^b and p^r, from frame to frame; the frame before k1 + 1 is the recorded k1. The predicted
 /// velocities are not looked at.
+///
+/// Foot skate is measured where the recorded window has contact labels, from the predicted positions of one frame to the next: the same
+/// frames for every model, and no model gains by calling its own feet lifted. A model that sets its feet down at other times than the dancer
+/// is charged for that.
 ///
 /// # Errors
 ///
@@ -54,7 +66,10 @@ pub fn window_scores(
         body_position: 0.0,
         velocity_factor: 0.0,
         root: 0.0,
+        foot_travel: 0.0,
+        foot_contacts: 0,
     };
+    let mut before_world = world_positions(recorded.row(0));
     let mut before = recorded.row(0);
     for (truth, frame) in recorded
         .rows()
@@ -80,6 +95,14 @@ pub fn window_scores(
         sums.body_position += distance(BODY_POSITIONS);
         sums.velocity_factor += factor_error / PARTS as f64;
         sums.root += distance(ROOT_POSITION);
+        let world = world_positions(frame);
+        for (label, joint) in CONTACTS.zip(FOOT_JOINTS) {
+            if truth[label] > 0.5 {
+                sums.foot_travel += world[joint].distance(before_world[joint]);
+                sums.foot_contacts += 1;
+            }
+        }
+        before_world = world;
         before = frame;
     }
     let frames = length as f64;
@@ -87,7 +110,16 @@ pub fn window_scores(
         body_position: sums.body_position / frames,
         velocity_factor: sums.velocity_factor / frames,
         root: sums.root / frames,
+        ..sums
     })
+}
+
+/// Foot skate over the windows of one length: mean distance (cm/frame) that a foot joint moves in a frame in which the recorded one is in
+/// contact. None where no window has a contact.
+pub fn foot_skate(windows: &[WindowScores]) -> Option<f64> {
+    let travel: f64 = windows.iter().map(|window| window.foot_travel).sum();
+    let contacts: usize = windows.iter().map(|window| window.foot_contacts).sum();
+    (contacts > 0).then(|| travel / contacts as f64)
 }
 
 /// Means over the windows of one length: LRP (cm, eq. 12), AVF (share, eq. 13) and ART (share, eq. 15), in this order.

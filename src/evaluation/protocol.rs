@@ -5,7 +5,7 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use super::metrics::{WindowScores, means, window_scores};
+use super::metrics::{WindowScores, foot_skate, means, window_scores};
 use super::scores::{Evaluation, LengthScores};
 use super::window_request::window_request;
 use crate::data::{DanceClip, Window, window_features, windows};
@@ -138,6 +138,7 @@ impl Protocol {
         }
         let clip_frames: Vec<usize> = clips.iter().map(|clip| clip.features.nrows()).collect();
         let mut scores = [BTreeMap::new(), BTreeMap::new(), BTreeMap::new()];
+        let mut skates = Some(BTreeMap::new());
         let mut counts = BTreeMap::new();
         let mut skipped = Vec::new();
         for &length in &self.lengths {
@@ -166,6 +167,12 @@ impl Protocol {
             for (scores, mean) in scores.iter_mut().zip(means) {
                 scores.insert(length, mean);
             }
+            skates = skates
+                .zip(foot_skate(&measured))
+                .map(|(mut skates, skate)| {
+                    skates.insert(length, skate);
+                    skates
+                });
             counts.insert(length, measured.len());
         }
         let [lrp, avf, art] = scores.map(LengthScores::new);
@@ -174,6 +181,7 @@ impl Protocol {
                 lrp,
                 avf,
                 art,
+                foot_skate: skates.map(LengthScores::new),
                 windows: counts,
             },
             skipped,

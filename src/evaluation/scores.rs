@@ -66,7 +66,7 @@ impl TryFrom<BTreeMap<String, f64>> for LengthScores {
     }
 }
 
-/// LRP, AVF and ART of a model by transition length, as written to JSON.
+/// LRP, AVF, ART and foot skate of a model by transition length, as written to JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evaluation {
@@ -76,6 +76,10 @@ pub struct Evaluation {
     pub avf: LengthScores,
     /// Share of windows on the root trajectory asked for (eq. 15).
     pub art: LengthScores,
+    /// Foot skate, cm/frame: how far a foot joint moves in a frame in which the recorded one is in contact (lower is better; below 0.45 in recorded
+    /// motion, by the threshold of the labels). None in scores of earlier versions, or where some length has no contact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub foot_skate: Option<LengthScores>,
     /// Number of windows at each length.
     pub windows: BTreeMap<usize, usize>,
 }

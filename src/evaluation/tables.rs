@@ -267,6 +267,20 @@ pub fn terminal_tables(rows: &[TableRow]) -> String {
         }
         out.push('\n');
     }
+    if measured
+        .iter()
+        .any(|(_, evaluation)| evaluation.foot_skate.is_some())
+    {
+        out += &line("foot skate (cm/frame)", &header);
+        for (row, evaluation) in &measured {
+            let skate = evaluation.foot_skate.as_ref();
+            let ours = skate.map_or(vec![None; header.len()], |skate| {
+                our_values(skate, &lengths)
+            });
+            out += &line(&row.name, &cells(&ours, false));
+        }
+        out.push('\n');
+    }
     for (row, evaluation) in &measured {
         let counts: Vec<String> = lengths
             .iter()

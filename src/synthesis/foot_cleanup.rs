@@ -3,7 +3,8 @@
 //! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact the joint is held at one place; before and after,
 //! the correction comes and goes along a smooth curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel
 //! and toe are both held. A run over a keyframe holds the joint where the keyframe has it; one over several keyframes is split between them; near
-//! a keyframe outside the run the correction fades. So no keyframe changes.
+//! a keyframe outside the run the correction fades. So no keyframe changes. Feet that are predicted to slide far in one contact are let go rather than
+//! held beside where the body is.
 
 use glam::{DQuat, DVec3};
 
@@ -16,6 +17,9 @@ const EASE: usize = 6;
 const SHORTEST: usize = 3;
 /// Gaps in a contact up to this many frames are noise in the labels.
 const GAP: usize = 2;
+/// A joint that is predicted this far (cm) from its place is held there; from `RELEASED` on it is let go: the leg would cross the body.
+const HELD: f64 = 15.0;
+const RELEASED: f64 = 30.0;
 /// Corrections below this are none, cm.
 const STILL: f64 = 1e-9;
 /// Bones below this have no direction, cm.
@@ -170,7 +174,8 @@ impl Hold {
             let others = keyframes.iter().filter(|other| !(from..to).contains(other));
             let apart = others.map(|&other| other.abs_diff(frame)).min();
             let free = apart.map_or(1.0, |apart| smooth(apart as f64 / EASE as f64));
-            let weight = eased * free;
+            let slid = (place.distance(path[nearest]) - HELD) / (RELEASED - HELD);
+            let weight = eased * free * (1.0 - smooth(slid));
             self.correction[frame] += weight * (place - path[nearest]);
             self.weight[frame] += weight;
         }
@@ -221,4 +226,55 @@ fn aim_foot(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], place: DV
     }
     let turn = DQuat::from_rotation_arc(now.normalize(), wanted.normalize());
     pose.rotations[ankle] = (rotations[knee].inverse() * turn * rotations[ankle]).normalize();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn on(runs: &[(usize, usize)], frames: usize) -> Vec<bool> {
+        (0..frames)
+            .map(|frame| runs.iter().any(|&(from, to)| (from..to).contains(&frame)))
+            .collect()
+    }
+
+    fn stand(from: usize, to: usize, keyframe: Option<usize>) -> Stand {
+        Stand { from, to, keyframe }
+    }
+
+    #[test]
+    fn flickering_labels_make_one_stand_and_stray_ones_none() {
+        let labels = on(&[(5, 10), (11, 20), (30, 32)], 40);
+        assert_eq!(stands(&labels, &[0]), [stand(5, 20, None)]);
+    }
+
+    #[test]
+    fn a_stand_over_two_keyframes_is_split_between_them() {
+        let found = stands(&on(&[(0, 100)], 100), &[0, 50, 54, 99]);
+        let expected = [
+            stand(0, 19, Some(0)),
+            stand(31, 51, Some(50)),
+            stand(54, 70, Some(54)),
+            stand(82, 100, Some(99)),
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_held_joint_stays_put_and_keyframes_are_not_moved() {
+        let path: Vec<DVec3> = (0..60).map(|x| DVec3::X * 0.2 * x as f64).collect();
+        let keyframes = [0, 20, 59];
+        let hold = Hold::new(&[stand(15, 40, Some(20))], &path, &keyframes);
+        for keyframe in keyframes {
+            assert!(hold.correction[keyframe].length() < 1e-9);
+        }
+        for frame in 15..40 {
+            assert!((path[frame] + hold.correction[frame]).distance(path[20]) < 1e-9);
+        }
+        let steps = hold
+            .correction
+            .windows(2)
+            .map(|pair| pair[0].distance(pair[1]));
+        assert!(steps.fold(0.0, f64::max) < 2.0);
+    }
 }

@@ -6,12 +6,16 @@ use ndarray::ArrayView1;
 
 use super::SequenceRequest;
 use crate::data::DataRanges;
-use crate::motion::PART_NAMES;
+use crate::motion::{PART_NAMES, PART_WEIGHTS};
 
 /// The longest transition of the paper, frames.
 const LONGEST: usize = 250;
 /// A root that a keyframe was moved by more than this is worth a word, cm.
 const MOVED: f64 = 1.0;
+const TRUNK: usize = 0;
+/// A contradiction is a trunk that would have to move at more than this many times its velocity factor, and by more than `SLACK` cm/frame more.
+const TOLERANCE: f64 = 1.2;
+const SLACK: f64 = 0.2;
 
 /// A control out of range; its `Display` says by how much.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +37,13 @@ pub enum ControlWarning {
         frame: usize,
         asked: f64,
         bound: f64,
+        frames: usize,
+    },
+    /// The trunk's velocity factor counts the root, so the trajectory alone makes it at least this.
+    Contradiction {
+        frame: usize,
+        asked: f64,
+        least: f64,
         frames: usize,
     },
     Length {
@@ -86,6 +97,16 @@ impl fmt::Display for ControlWarning {
                 PART_NAMES[part],
                 asked / bound
             ),
+            Self::Contradiction {
+                frame,
+                asked,
+                least,
+                frames,
+            } => write!(
+                f,
+                "the velocity factor of the trunk is {asked:.1} cm/frame at frame {frame}, but the root trajectory alone makes it {least:.1} or \
+                 more there; the two contradict each other in {frames} frames"
+            ),
             Self::Length { from, to } => write!(
                 f,
                 "the transition from frame {from} to {to} has {} frames; beyond {LONGEST} dances repeat themselves",
@@ -110,6 +131,14 @@ pub fn control_warnings(
         if to - from > LONGEST {
             warnings.push(ControlWarning::Length { from, to });
         }
+    }
+    if let Some((frame, _, frames)) = beyond(shortfalls(request), 0.0) {
+        warnings.push(ControlWarning::Contradiction {
+            frame,
+            asked: request.velocity_factors[[frame, TRUNK]],
+            least: least_trunk(request, frame),
+            frames,
+        });
     }
     let Some(ranges) = ranges else {
         return warnings;
@@ -158,6 +187,26 @@ pub fn control_warnings(
         }
     }
     warnings
+}
+
+/// What the trajectory alone makes of the trunk's velocity factor (eq. 1 with a body that keeps its pose), cm/frame.
+fn least_trunk(request: &SequenceRequest, frame: usize) -> f64 {
+    let Some(before) = frame.checked_sub(1) else {
+        return 0.0;
+    };
+    let root = &request.root_trajectory;
+    let weights: f64 = PART_WEIGHTS[TRUNK].iter().map(|(_, weight)| weight).sum();
+    let of_root = PART_WEIGHTS[TRUNK].iter().find(|(joint, _)| *joint == 0);
+    let share = of_root.map_or(0.0, |(_, weight)| weight / weights);
+    share * distance(root.row(before), root.row(frame))
+}
+
+/// How far the trunk's velocity factors fall short of what the trajectory makes them, in frames where that is more than rounding.
+fn shortfalls(request: &SequenceRequest) -> impl Iterator<Item = f64> + '_ {
+    (0..request.frames()).map(|frame| {
+        let asked = request.velocity_factors[[frame, TRUNK]];
+        least_trunk(request, frame) - TOLERANCE * asked - SLACK
+    })
 }
 
 /// Warnings of keyframes that were moved onto a trajectory by these distances (cm), in their order.

@@ -54,6 +54,7 @@ mod tests {
             lrp: scores.clone(),
             avf: scores.clone(),
             art: scores,
+            foot_skate: None,
             windows: LONG.map(|length| (length, 1)).into(),
         }
     }

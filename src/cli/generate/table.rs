@@ -22,10 +22,10 @@ pub fn read(path: &Path, columns: &[&str], frames: usize) -> anyhow::Result<Arra
             columns.join(",")
         )
     };
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name} cannot be read"))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_path(path)
-        .with_context(|| format!("{name} cannot be read"))?;
+        .from_reader(text.as_bytes());
     let header = reader
         .headers()
         .with_context(|| format!("{name}, line 1: {}", header_needed()))?
@@ -52,7 +52,10 @@ pub fn read(path: &Path, columns: &[&str], frames: usize) -> anyhow::Result<Arra
             break;
         }
         let record = record.with_context(|| format!("{name} is no table"))?;
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = line_of(
+            &text,
+            record.position().map_or(0, csv::Position::byte) as usize,
+        );
         let number = |place: usize, column: &str| -> anyhow::Result<f64> {
             let text = record.get(place).unwrap_or_default();
             match text.parse::<f64>() {
@@ -84,4 +87,13 @@ pub fn read(path: &Path, columns: &[&str], frames: usize) -> anyhow::Result<Arra
         );
     }
     Ok(rows)
+}
+
+/// The line, from 1 on, of the row that is read from a byte of the text on: the reader steps over empty lines before it.
+fn line_of(text: &str, start: usize) -> usize {
+    let row = start
+        + text[start..]
+            .find(|letter| letter != '\n' && letter != '\r')
+            .unwrap_or(0);
+    1 + text[..row].matches('\n').count()
 }
