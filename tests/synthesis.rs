@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Mutex;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, DataRanges, window_features};
 use keydance::evaluation::window_request;
@@ -74,7 +74,8 @@ fn a_bone_that_is_predicted_too_long_shows_in_the_errors() {
     assert!(transition_motion(&request, &transition, "transition", 1.0 / 30.0).is_err());
 }
 
-/// Interpolation that goes astray on its way: it misses every keyframe, and its first frames already. Keeps what it was asked.
+/// Interpolation between two other poses, on another path, with bones that are too long: it misses every keyframe, and its first frames already. Keeps
+/// what it was asked.
 #[derive(Default)]
 struct Astray {
     asked: Mutex<Vec<TransitionRequest>>,
@@ -86,19 +87,28 @@ impl TransitionModel for Astray {
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
-        let mut transitions = Interpolation::default().transitions(requests)?;
+        self.asked.lock().unwrap().extend_from_slice(requests);
+        let mut astray = requests.to_vec();
+        for request in &mut astray {
+            for (keyframe, angle) in [(&mut request.start, 0.3), (&mut request.target, 0.9)] {
+                for joint in [1, 6, 11, 15, 19] {
+                    let turned = DQuat::from_rotation_z(angle) * keyframe.pose.rotations[joint];
+                    keyframe.pose.rotations[joint] = turned;
+                }
+            }
+        }
+        let mut transitions = Interpolation::default().transitions(&astray)?;
         for transition in &mut transitions {
             let frames = transition.frames.nrows() as f64;
             for (step, mut row) in transition.frames.rows_mut().into_iter().enumerate() {
                 let share = (step + 1) as f64 / frames;
-                for column in BODY_POSITIONS.skip(39) {
-                    row[column] += 8.0 + 6.0 * (0.3 * step as f64 + column as f64).sin();
+                for column in BODY_POSITIONS {
+                    row[column] *= 1.05;
                 }
-                row[ROOT_POSITION.start] += 5.0 + 20.0 * share;
-                row[FACING.start] += 0.2 + share;
+                row[ROOT_POSITION.start] += 5.0 + 10.0 * share;
+                row[FACING.start] += 0.1 + 0.4 * share;
             }
         }
-        self.asked.lock().unwrap().extend_from_slice(requests);
         Ok(transitions)
     }
 }

@@ -3,8 +3,8 @@
 //! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact the joint is held at one place; before and after,
 //! the correction comes and goes along a smooth curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel
 //! and toe are both held. A run over a keyframe holds the joint where the keyframe has it; one over several keyframes is split between them; near
-//! a keyframe outside the run the correction fades. So no keyframe changes. Feet that are predicted to slide far in one contact are let go rather than
-//! held beside where the body is.
+//! a keyframe outside the run the correction fades. So no keyframe changes. A joint that is predicted to slide far in one contact is held at one
+//! place after another: it steps instead.
 
 use glam::{DQuat, DVec3};
 
@@ -17,9 +17,8 @@ const EASE: usize = 6;
 const SHORTEST: usize = 3;
 /// Gaps in a contact up to this many frames are noise in the labels.
 const GAP: usize = 2;
-/// A joint that is predicted this far (cm) from its place is held there; from `RELEASED` on it is let go: the leg would cross the body.
+/// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held at another place from then on.
 const HELD: f64 = 15.0;
-const RELEASED: f64 = 30.0;
 /// Corrections below this are none, cm.
 const STILL: f64 = 1e-9;
 /// Bones below this have no direction, cm.
@@ -73,7 +72,12 @@ pub(super) fn pin_feet(
         let hold = |joint: usize, label: usize| {
             let on: Vec<bool> = contacts.iter().map(|labels| labels[label]).collect();
             let path: Vec<DVec3> = world.iter().map(|world| world[joint]).collect();
-            Hold::new(&stands(&on, keyframes), &path, keyframes)
+            let stands = stands(&on, keyframes);
+            let stands: Vec<Stand> = stands
+                .iter()
+                .flat_map(|stand| steps(stand, &path))
+                .collect();
+            Hold::new(&stands, &path, keyframes)
         };
         let ankle = hold(leg.joints[2], leg.labels[0]);
         let toe = hold(leg.joints[3], leg.labels[1]);
@@ -136,6 +140,44 @@ fn stands(on: &[bool], keyframes: &[usize]) -> Vec<Stand> {
     stands
 }
 
+/// A stand cut where the joint leaves its place; the place is the keyframe's, or that of the frame where it is held first. Between two pieces are the
+/// frames of a step.
+fn steps(stand: &Stand, path: &[DVec3]) -> Vec<Stand> {
+    let leaves = |from: usize, frame: usize| path[frame].distance(path[from]) > HELD;
+    let ends = |from: usize| (from..stand.to).find(|&frame| leaves(from, frame));
+    let begins = |from: usize| (stand.from..from).rev().find(|&frame| leaves(from, frame));
+    let anchor = stand.keyframe.unwrap_or(stand.from);
+    let first = Stand {
+        from: begins(anchor).map_or(stand.from, |frame| frame + 1),
+        to: ends(anchor).unwrap_or(stand.to),
+        keyframe: stand.keyframe,
+    };
+    let mut pieces = vec![first];
+    let mut next = first.to + EASE;
+    while next < stand.to {
+        let to = ends(next).unwrap_or(stand.to);
+        pieces.push(Stand {
+            from: next,
+            to,
+            keyframe: None,
+        });
+        next = to + EASE;
+    }
+    let mut end = first.from.saturating_sub(EASE);
+    while end > stand.from {
+        let from = begins(end - 1).map_or(stand.from, |frame| frame + 1);
+        pieces.push(Stand {
+            from,
+            to: end,
+            keyframe: None,
+        });
+        end = from.saturating_sub(EASE);
+    }
+    pieces.sort_by_key(|piece| piece.from);
+    pieces.retain(|piece| piece.keyframe.is_some() || piece.to - piece.from >= SHORTEST);
+    pieces
+}
+
 impl Hold {
     fn new(stands: &[Stand], path: &[DVec3], keyframes: &[usize]) -> Self {
         let mut hold = Self {
@@ -174,8 +216,7 @@ impl Hold {
             let others = keyframes.iter().filter(|other| !(from..to).contains(other));
             let apart = others.map(|&other| other.abs_diff(frame)).min();
             let free = apart.map_or(1.0, |apart| smooth(apart as f64 / EASE as f64));
-            let slid = (place.distance(path[nearest]) - HELD) / (RELEASED - HELD);
-            let weight = eased * free * (1.0 - smooth(slid));
+            let weight = eased * free;
             self.correction[frame] += weight * (place - path[nearest]);
             self.weight[frame] += weight;
         }
@@ -258,6 +299,21 @@ mod tests {
             stand(82, 100, Some(99)),
         ];
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_joint_that_slides_far_is_held_at_one_place_after_another() {
+        let path: Vec<DVec3> = (0..100).map(|x| DVec3::X * x as f64).collect();
+        let found = steps(&stand(10, 90, Some(40)), &path);
+        let expected = [
+            stand(10, 19, None),
+            stand(25, 56, Some(40)),
+            stand(62, 78, None),
+            stand(84, 90, None),
+        ];
+        assert_eq!(found, expected);
+        let still = [DVec3::ONE; 100];
+        assert_eq!(steps(&stand(10, 90, None), &still), [stand(10, 90, None)]);
     }
 
     #[test]

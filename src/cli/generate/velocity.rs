@@ -15,7 +15,7 @@ use crate::synthesis::SequenceRequest;
 pub struct VelocityArgs {
     /// Velocity factors times a constant: 0.5 for all parts, or parts with one each, such as right_arm=1.5,left_leg=1.5; parts: trunk, left_leg, right_leg,
     /// right_arm, left_arm
-    #[arg(long, value_name = "FACTORS", value_parser = parse_gains)]
+    #[arg(long, value_name = "FACTORS", value_parser = parse_gains, allow_hyphen_values = true)]
     velocity: Option<Gains>,
     /// Velocity factors of another clip, from its frame FRAME (0 where left out) on [default: --motion's, else evenly from keyframe to keyframe]
     #[arg(long, value_name = "FILE.bvh[:FRAME]")]
