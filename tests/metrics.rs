@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 use keydance::data::DanceClip;
-use keydance::evaluation::metrics::means;
+use keydance::evaluation::metrics::{foot_skate, means};
 use keydance::evaluation::{
     Evaluation, EvaluationError, LengthScores, Protocol, WindowScores, window_scores,
 };
 use keydance::models::{ModelError, Transition, TransitionModel, TransitionRequest};
-use keydance::motion::features::{BODY_VELOCITIES, FEATURES, FRAME, ROOT_POSITION};
+use keydance::motion::features::{BODY_VELOCITIES, CONTACTS, FEATURES, FRAME, ROOT_POSITION};
 use keydance::motion::{
     Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, Joint, Pose, Skeleton, features,
 };
@@ -71,6 +71,25 @@ fn velocity_factors_come_from_predicted_positions_and_start_at_the_true_keyframe
         .fill(100.0);
     let scores = window_scores(recorded.view(), &predicted).unwrap();
     assert!((scores.velocity_factor - 2.4 / (2.0 * 5.0)).abs() < 1e-12);
+}
+
+#[test]
+fn foot_skate_counts_where_the_recorded_feet_stand_whatever_the_model_says_of_its_own() {
+    // Recorded: the left ankle stands in frames 1 and 2 of 3. Predicted: it goes 2, 4 and 8 cm a frame.
+    let mut recorded = still(3);
+    recorded[[1, CONTACTS.start]] = 1.0;
+    recorded[[2, CONTACTS.start]] = 1.0;
+    let mut predicted = perfect(&recorded);
+    let ankle = 3 * (3 - 1);
+    for (step, place) in [2.0, 6.0, 14.0].into_iter().enumerate() {
+        predicted.frames[[step, ankle]] = place;
+    }
+    predicted.frames.slice_mut(s![.., CONTACTS]).fill(0.0);
+    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    assert_eq!((scores.foot_travel, scores.foot_contacts), (6.0, 2));
+    let lifted = window_scores(still(3).view(), &predicted).unwrap();
+    assert_eq!(foot_skate(&[scores, lifted]), Some(3.0));
+    assert_eq!(foot_skate(&[lifted]), None);
 }
 
 #[test]
@@ -341,6 +360,16 @@ fn the_json_has_lengths_as_keys_and_avg_and_reads_back() {
     assert_eq!(
         serde_json::from_str::<Evaluation>(&json).unwrap(),
         evaluation
+    );
+    // Scores of a version that did not measure foot skate are read as above; those of this one keep it.
+    let with_skate = Evaluation {
+        foot_skate: Some(scores([0.5, 1.5])),
+        ..evaluation
+    };
+    let text = serde_json::to_string(&with_skate).unwrap();
+    assert_eq!(
+        serde_json::from_str::<Evaluation>(&text).unwrap(),
+        with_skate
     );
     let error = serde_json::from_str::<Evaluation>(&json.replace("\"10\":13.5", "\"ten\":1.0"));
     assert!(error.unwrap_err().to_string().contains("\"ten\""));
