@@ -56,7 +56,7 @@ enum Command {
     ExportBatch(export_batch::ExportBatchArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
-    Generate(generate::GenerateArgs),
+    Generate(Box<generate::GenerateArgs>),
     /// Compare the gradient of a model's whole loss with central differences
     Gradcheck(gradcheck::GradcheckArgs),
     /// Train a model
@@ -84,7 +84,7 @@ impl Cli {
             Command::Bvh(args) => bvh::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
             Command::Features(args) => features::run(args)?,
-            Command::Generate(args) => generate::run(args)?,
+            Command::Generate(args) => generate::run(*args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => evaluate::run(args)?,

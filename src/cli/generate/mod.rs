@@ -72,7 +72,7 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.json {
         write_json(path, &summary)?;
     }
-    write!(std::io::stdout(), "{summary}{}\n", args.out.display())?;
+    writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())
 }
 
