@@ -7,13 +7,10 @@ use ndarray::{ArrayView2, s};
 use crate::models::{ModelError, Transition};
 use crate::motion::contact::FOOT_JOINTS;
 use crate::motion::features::{
-    BODY_POSITIONS, CONTACTS, FACING, FEATURES, ROOT_POSITION, VELOCITY_FACTORS,
+    BODY_POSITIONS, CONTACTS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS,
 };
 use crate::motion::placement::world_positions;
-use crate::motion::{PARTS, velocity_factors};
-
-/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by side in a frame.
-const POSITIONS: Range<usize> = BODY_POSITIONS.start..FACING.start;
+use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
 /// How far one predicted window is from the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,11 +80,7 @@ pub fn window_scores(
                 .sum::<f64>()
                 .sqrt()
         };
-        let velocities = std::array::from_fn(|number| {
-            let column = POSITIONS.start + number;
-            frame[column] - before[column]
-        });
-        let factor_error: f64 = velocity_factors(&velocities)
+        let factor_error: f64 = velocity_factors_between(before, frame)
             .iter()
             .zip(truth.slice(s![VELOCITY_FACTORS]))
             .map(|(predicted, wanted)| (predicted - wanted).abs())

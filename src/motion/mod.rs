@@ -21,4 +21,7 @@ pub use features::{FeatureConfig, FeatureError, features};
 pub use mapping::{Mapping, MappingError};
 pub use resample::{ResampleError, resample};
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
-pub use velocity_factor::{PART_NAMES, PART_WEIGHTS, PARTS, velocity_factors};
+pub use velocity_factor::{
+    PART_NAMES, PART_WEIGHTS, PARTS, measured_velocity_factors, velocity_factors,
+    velocity_factors_between,
+};

@@ -1,10 +1,19 @@
 //! Velocity factors: how fast each of the five body parts moves (eq. 1).
 
+use std::ops::Range;
+
+use ndarray::{ArrayView1, ArrayView2};
+
+use super::features::{BODY_POSITIONS, FACING};
+
 /// Number of body parts (M = 5).
 pub const PARTS: usize = 5;
 
-/// Names of the body parts.
+/// Names of the body parts, in the order of every velocity factor.
 pub const PART_NAMES: [&str; PARTS] = ["trunk", "left_leg", "right_leg", "right_arm", "left_arm"];
+
+/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by side in a frame.
+const POSITIONS: Range<usize> = BODY_POSITIONS.start..FACING.start;
 
 /// Joint weights of each body part (figure 4): `(joint of the dance skeleton, weight)`.
 ///
@@ -37,6 +46,34 @@ pub fn velocity_factors(velocities: &[f64; 72]) -> [f64; PARTS] {
             .sum();
         weighted / part.iter().map(|&(_, weight)| weight).sum::<f64>()
     })
+}
+
+/// Eq. 1 for the motion from one frame to the next, `[5]`, cm/frame: the velocities are the differences of p^b and p^r.
+///
+/// `before`, `frame`: a frame's numbers, not standardised; the velocities among them are not looked at.
+pub fn velocity_factors_between(before: ArrayView1<f64>, frame: ArrayView1<f64>) -> [f64; PARTS] {
+    velocity_factors(&std::array::from_fn(|number| {
+        let column = POSITIONS.start + number;
+        frame[column] - before[column]
+    }))
+}
+
+/// The velocity factors of every frame as its positions give them, `[frames][5]`, cm/frame.
+///
+/// `frames`: `[frames, 149 or 154]`, not standardised. The first frame, which none comes before, has those of the second; a
+/// single frame has 0.
+pub fn measured_velocity_factors(frames: ArrayView2<f64>) -> Vec<[f64; PARTS]> {
+    let pairs = frames
+        .rows()
+        .into_iter()
+        .zip(frames.rows().into_iter().skip(1));
+    let mut factors: Vec<_> = pairs
+        .map(|(before, frame)| velocity_factors_between(before, frame))
+        .collect();
+    if frames.nrows() > 0 {
+        factors.insert(0, factors.first().copied().unwrap_or([0.0; PARTS]));
+    }
+    factors
 }
 
 /// Norm of one joint's velocity; the root's three numbers stand last.
