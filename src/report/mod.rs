@@ -1,4 +1,4 @@
-//! Figures as SVG text: curves of losses and scores, and dancers side by side.
+//! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as HTML.
 //!
 //! A figure knows numbers and positions only, no model and no training.
 
@@ -9,11 +9,13 @@ pub mod lrp_curve;
 pub mod motion_figure;
 pub mod svg;
 pub mod validation_curve;
+pub mod viewer;
 
 pub use loss_curve::{LossSeries, loss_curve};
 pub use lrp_curve::{LrpSeries, lrp_curve};
 pub use motion_figure::{MotionFigure, MotionRow};
 pub use validation_curve::{ValidationSeries, validation_curve};
+pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 
 /// Why a figure cannot be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,5 +32,13 @@ pub enum FigureError {
         row: String,
         found: usize,
         expected: usize,
+    },
+    #[error(
+        "{figure:?}: keyframe {frame} lies outside its {frames} frames, which are numbered from 0"
+    )]
+    Keyframe {
+        figure: String,
+        frame: usize,
+        frames: usize,
     },
 }

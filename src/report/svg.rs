@@ -176,8 +176,8 @@ impl Svg {
     }
 }
 
-/// Text as XML content or attribute value; characters that XML forbids become U+FFFD.
-fn escape(text: &str) -> String {
+/// Text as content or attribute value of XML and HTML; characters that XML forbids become U+FFFD.
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -1,0 +1,317 @@
+//! The motion viewer: motions in 3D as one HTML page that opens from disk and needs no network.
+//!
+//! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as JSON. Nothing that a user wrote becomes
+//! markup: names are escaped in the page's title, and inside the JSON no `<` is left that could end its element.
+
+mod page;
+mod positions;
+
+use glam::DVec3;
+use ndarray::{ArrayView1, ArrayView2};
+use serde::Serialize;
+
+use super::FigureError;
+use crate::motion::contact::FOOT_JOINTS;
+use crate::motion::features::CONTACTS;
+use crate::motion::placement::world_positions;
+use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
+use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
+use positions::Steps;
+
+/// Index of the joint that carries the head.
+const HEAD: usize = 23;
+/// A foot joint is drawn as standing where its contact label is at least this.
+const CONTACT: f64 = 0.5;
+/// The body parts as the page calls them.
+const PART_LABELS: [&str; PARTS] = ["Trunk", "Left leg", "Right leg", "Right arm", "Left arm"];
+
+/// Motions to be looked at together. All have the same number of frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Viewer {
+    /// Stands above, such as the name of the clip.
+    pub title: String,
+    /// Seconds a frame.
+    pub frame_time: f64,
+    /// In the order of their keys 1, 2, 3 ...; the first decides where the floor is.
+    pub motions: Vec<ViewerMotion>,
+    pub keyframes: Vec<ViewerKeyframe>,
+    /// What the motions were made to follow, if anything.
+    pub asked: Option<Asked>,
+}
+
+/// What a model was asked for beside the keyframes, one row a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked {
+    /// Root positions, cm.
+    pub root_trajectory: Vec<DVec3>,
+    /// Velocity factors, cm/frame.
+    pub velocity_factors: Vec<[f64; PARTS]>,
+}
+
+impl Asked {
+    /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame. Panics on fewer columns.
+    pub fn new(root_trajectory: ArrayView2<f64>, velocity_factors: ArrayView2<f64>) -> Self {
+        let place = |row: ArrayView1<f64>| DVec3::new(row[0], row[1], row[2]);
+        let factors = |row: ArrayView1<f64>| std::array::from_fn(|part| row[part]);
+        Self {
+            root_trajectory: root_trajectory.rows().into_iter().map(place).collect(),
+            velocity_factors: velocity_factors.rows().into_iter().map(factors).collect(),
+        }
+    }
+}
+
+/// Where a motion comes from, which decides its colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MotionKind {
+    /// Motion capture: blue-grey.
+    Recorded,
+    /// The model's, yellow as in the paper's figures.
+    Model,
+    /// A baseline's: violet, green, rose in this order.
+    Other,
+}
+
+/// One motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewerMotion {
+    pub name: String,
+    pub kind: MotionKind,
+    /// World positions of the joints, `[frames][24]`, cm, Y up.
+    pub positions: Vec<[DVec3; JOINTS]>,
+    /// Which of LeftFoot, LeftToeBase, RightFoot, RightToeBase stand, a row a frame.
+    pub contacts: Vec<[bool; 4]>,
+    /// Velocity factors as measured, a row a frame, cm/frame.
+    pub velocity_factors: Vec<[f64; PARTS]>,
+}
+
+/// A pose that was given, drawn red.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewerKeyframe {
+    pub frame: usize,
+    /// World positions of the joints, cm.
+    pub positions: [DVec3; JOINTS],
+}
+
+impl ViewerMotion {
+    /// A motion from its frames' numbers, `[frames, 149 or 154]`, not standardised. Velocity factors are measured on the positions.
+    pub fn from_features(
+        name: impl Into<String>,
+        kind: MotionKind,
+        frames: ArrayView2<f64>,
+    ) -> Self {
+        let contacts = |frame: ArrayView1<f64>| {
+            std::array::from_fn(|foot| frame[CONTACTS.start + foot] >= CONTACT)
+        };
+        Self {
+            name: name.into(),
+            kind,
+            positions: frames.rows().into_iter().map(world_positions).collect(),
+            contacts: frames.rows().into_iter().map(contacts).collect(),
+            velocity_factors: measured_velocity_factors(frames),
+        }
+    }
+}
+
+impl Viewer {
+    /// The page.
+    ///
+    /// # Errors
+    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a keyframe outside, a NaN or infinity.
+    pub fn html(&self) -> Result<String, FigureError> {
+        self.check()?;
+        let frames = self.frames();
+        let nothing = Asked {
+            root_trajectory: Vec::new(),
+            velocity_factors: Vec::new(),
+        };
+        let asked = self.asked.as_ref().unwrap_or(&nothing);
+        let data = PageData {
+            summary: self.summary(),
+            frames,
+            frame_time: self.frame_time,
+            parents: DANCE_PARENTS.map(|parent| parent.map_or(-1, |parent| parent as i32)),
+            head: HEAD,
+            feet: FOOT_JOINTS,
+            parts: PART_LABELS,
+            motions: self.motions.iter().map(PageMotion::new).collect(),
+            keyframes: self
+                .keyframes
+                .iter()
+                .map(|keyframe| PageKeyframe {
+                    frame: keyframe.frame,
+                    positions: Steps::new(std::slice::from_ref(&keyframe.positions)),
+                })
+                .collect(),
+            trajectory: asked
+                .root_trajectory
+                .iter()
+                .map(|place| place.to_array().map(|x| rounded(x, 1)))
+                .collect(),
+            asked: rounded_rows(&asked.velocity_factors),
+        };
+        Ok(page::page(&self.title, &data))
+    }
+
+    fn frames(&self) -> usize {
+        self.motions
+            .first()
+            .map_or(0, |motion| motion.positions.len())
+    }
+
+    /// "101 frames, 3.3 s at 30 fps, 2 keyframes".
+    fn summary(&self) -> String {
+        let frames = self.frames();
+        let keyframes = match self.keyframes.len() {
+            0 => String::new(),
+            1 => ", 1 keyframe".into(),
+            count => format!(", {count} keyframes"),
+        };
+        format!(
+            "{frames} frames, {:.1} s at {:.0} fps{keyframes}",
+            (frames - 1) as f64 * self.frame_time,
+            1.0 / self.frame_time
+        )
+    }
+
+    fn check(&self) -> Result<(), FigureError> {
+        let empty = |what| FigureError::Empty {
+            figure: self.title.clone(),
+            what,
+        };
+        if self.motions.is_empty() {
+            return Err(empty("no motions"));
+        }
+        let frames = self.frames();
+        if frames == 0 {
+            return Err(empty("no frames"));
+        }
+        if !(self.frame_time.is_finite() && self.frame_time > 0.0) {
+            return Err(self.not_finite("the frame time"));
+        }
+        let motions = self.motions.iter().flat_map(|motion| {
+            [
+                (motion.name.as_str(), motion.positions.len()),
+                (motion.name.as_str(), motion.contacts.len()),
+                (motion.name.as_str(), motion.velocity_factors.len()),
+            ]
+        });
+        let asked = self.asked.iter().flat_map(|asked| {
+            [
+                ("the root trajectory", asked.root_trajectory.len()),
+                ("the velocity factors", asked.velocity_factors.len()),
+            ]
+        });
+        if let Some((row, found)) = motions.chain(asked).find(|(_, count)| *count != frames) {
+            return Err(FigureError::Frames {
+                figure: self.title.clone(),
+                row: row.into(),
+                found,
+                expected: frames,
+            });
+        }
+        if let Some(keyframe) = self.keyframes.iter().find(|key| key.frame >= frames) {
+            return Err(FigureError::Keyframe {
+                figure: self.title.clone(),
+                frame: keyframe.frame,
+                frames,
+            });
+        }
+        self.check_numbers()
+    }
+
+    fn check_numbers(&self) -> Result<(), FigureError> {
+        for motion in &self.motions {
+            let finite = motion.positions.iter().flatten().all(|x| x.is_finite())
+                && motion
+                    .velocity_factors
+                    .iter()
+                    .flatten()
+                    .all(|x| x.is_finite());
+            if !finite {
+                return Err(self.not_finite(&motion.name));
+            }
+        }
+        let mut given = self.keyframes.iter().flat_map(|key| &key.positions);
+        if !given.all(|x| x.is_finite()) {
+            return Err(self.not_finite("a keyframe"));
+        }
+        if let Some(asked) = &self.asked
+            && !(asked.root_trajectory.iter().all(|x| x.is_finite())
+                && asked
+                    .velocity_factors
+                    .iter()
+                    .flatten()
+                    .all(|x| x.is_finite()))
+        {
+            return Err(self.not_finite("what was asked for"));
+        }
+        Ok(())
+    }
+
+    fn not_finite(&self, series: &str) -> FigureError {
+        FigureError::NotFinite {
+            figure: self.title.clone(),
+            series: series.into(),
+        }
+    }
+}
+
+/// What the page's scripts read (`data.js`).
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct PageData<'v> {
+    summary: String,
+    frames: usize,
+    frame_time: f64,
+    /// -1 for the root.
+    parents: [i32; JOINTS],
+    head: usize,
+    feet: [usize; 4],
+    parts: [&'static str; PARTS],
+    motions: Vec<PageMotion<'v>>,
+    keyframes: Vec<PageKeyframe>,
+    trajectory: Vec<[f64; 3]>,
+    asked: Vec<[f64; PARTS]>,
+}
+
+#[derive(Serialize)]
+struct PageMotion<'v> {
+    name: &'v str,
+    kind: MotionKind,
+    positions: Steps,
+    /// Bit k of a frame's number is foot joint k.
+    contacts: Vec<u8>,
+    factors: Vec<[f64; PARTS]>,
+}
+
+#[derive(Serialize)]
+struct PageKeyframe {
+    frame: usize,
+    positions: Steps,
+}
+
+impl<'v> PageMotion<'v> {
+    fn new(motion: &'v ViewerMotion) -> Self {
+        let bits = |feet: &[bool; 4]| {
+            let bits = feet.iter().enumerate();
+            bits.map(|(foot, &stands)| u8::from(stands) << foot).sum()
+        };
+        Self {
+            name: &motion.name,
+            kind: motion.kind,
+            positions: Steps::new(&motion.positions),
+            contacts: motion.contacts.iter().map(bits).collect(),
+            factors: rounded_rows(&motion.velocity_factors),
+        }
+    }
+}
+
+fn rounded_rows(rows: &[[f64; PARTS]]) -> Vec<[f64; PARTS]> {
+    rows.iter().map(|row| row.map(|x| rounded(x, 2))).collect()
+}
+
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let unit = 10f64.powi(decimals);
+    (value * unit).round() / unit
+}
