@@ -27,7 +27,7 @@ use crate::models::interpolation::Interpolation;
 use crate::training::{RunFolder, replace_file};
 use comparison::Comparison;
 use settings::Settings;
-use showcase::Showcase;
+use showcase::{Showcase, ShowcaseFiles};
 
 /// Exit code of a demo whose model is behind interpolation.
 const BEHIND: u8 = 4;
@@ -36,6 +36,7 @@ const TABLES: &str = "tables.md";
 const LOSS_CURVE: &str = "loss_curve.svg";
 const TRANSITION: &str = "transition.bvh";
 const FIGURE: &str = "motion.svg";
+const VIEWER: &str = "viewer.html";
 const INTERPOLATION: &str = "interpolation.json";
 const CHOREOGRAPHY: &str = "choreography.toml";
 
@@ -136,12 +137,12 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     )?;
 
     let showcase = Showcase::new(&dataset.test)?;
-    let motion = showcase.write(
-        &interpolation,
-        &model,
-        &run.path().join(FIGURE),
-        &run.path().join(TRANSITION),
-    )?;
+    let files = ShowcaseFiles {
+        figure: run.path().join(FIGURE),
+        viewer: run.path().join(VIEWER),
+        bvh: run.path().join(TRANSITION),
+    };
+    let motion = showcase.write(&interpolation, &model, &files)?;
     writeln!(
         out,
         "{TRANSITION}: {showcase}; its rotations meet the predicted positions to {:.1} cm in the mean, {:.1} cm at most",
@@ -190,6 +191,7 @@ fn remove_results(folder: &Path) -> anyhow::Result<()> {
         LOSS_CURVE,
         TRANSITION,
         FIGURE,
+        VIEWER,
         INTERPOLATION,
         CHOREOGRAPHY,
     ];

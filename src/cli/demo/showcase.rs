@@ -1,17 +1,20 @@
-//! One transition of a test clip: as a BVH file, and beside interpolation and the recorded motion.
+//! One transition of a test clip: as a BVH file, and beside interpolation and the recorded motion as a figure and in the viewer.
 
 use std::fmt;
-use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::Context as _;
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 use crate::data::{DanceClip, window_features};
 use crate::evaluation::window_request;
 use crate::models::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
+use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
-use crate::report::{MotionFigure, MotionRow};
+use crate::report::{
+    Asked, MotionFigure, MotionKind, MotionRow, Viewer, ViewerKeyframe, ViewerMotion,
+};
 use crate::synthesis::{SynthesisedMotion, transition_motion};
 use crate::training::replace_file;
 
@@ -49,7 +52,7 @@ impl<'d> Showcase<'d> {
         })
     }
 
-    /// Writes the model's transition as BVH, and the figure.
+    /// Writes the model's transition as BVH, the figure and the viewer's page.
     ///
     /// # Errors
     /// A model fails, or a file cannot be written.
@@ -57,17 +60,29 @@ impl<'d> Showcase<'d> {
         &self,
         interpolation: &dyn TransitionModel,
         model: &dyn TransitionModel,
-        figure: &Path,
-        bvh: &Path,
+        files: &ShowcaseFiles,
     ) -> anyhow::Result<SynthesisedMotion> {
         let predicted = self.predict(model)?;
-        let svg = self.figure(&self.predict(interpolation)?, &predicted)?;
-        replace_file(figure, svg.as_bytes())?;
-        let name = bvh.display().to_string();
+        let motions = [
+            ("Ground truth", MotionKind::Recorded, self.recorded.clone()),
+            (
+                "Interpolation",
+                MotionKind::Other,
+                self.shown(&self.predict(interpolation)?),
+            ),
+            (
+                "Small whole model",
+                MotionKind::Model,
+                self.shown(&predicted),
+            ),
+        ];
+        replace_file(&files.figure, self.figure(&motions)?.as_bytes())?;
+        replace_file(&files.viewer, self.viewer(&motions)?.as_bytes())?;
+        let name = files.bvh.display().to_string();
         let motion =
             transition_motion(&self.request, &predicted, &name, self.clip.clip.frame_time)?;
         let channels = channel_layout(&motion.clip, [Axis::Z, Axis::X, Axis::Y]);
-        bvh::write(bvh, &Bvh::from_clip(&motion.clip, channels)?)?;
+        bvh::write(&files.bvh, &Bvh::from_clip(&motion.clip, channels)?)?;
         Ok(motion)
     }
 
@@ -78,43 +93,61 @@ impl<'d> Showcase<'d> {
             .with_context(|| format!("{} gave no transition", model.name()))
     }
 
-    /// Recorded, interpolated and predicted motion in rows; both keyframes in each as they were given.
-    fn figure(&self, interpolated: &Transition, predicted: &Transition) -> anyhow::Result<String> {
-        let recorded: Vec<_> = self
-            .recorded
-            .rows()
-            .into_iter()
-            .map(world_positions)
-            .collect();
-        let row = |label: &str, transition: &Transition| {
-            let mut frames = recorded.clone();
-            let between = transition.frames.rows().into_iter().take(LENGTH - 1);
-            for (frame, positions) in frames[1..].iter_mut().zip(between) {
-                *frame = world_positions(positions);
-            }
-            MotionRow {
-                label: label.into(),
-                frames,
-                generated: true,
-            }
-        };
-        let truth = MotionRow {
-            label: "Ground truth".into(),
-            frames: recorded.clone(),
-            generated: false,
-        };
+    /// A prediction between the two keyframes as they were given, `[N + 1, 149]`.
+    fn shown(&self, transition: &Transition) -> Array2<f64> {
+        let mut frames = self.recorded.slice(s![.., ..FRAME]).to_owned();
+        let between = transition.frames.slice(s![..LENGTH - 1, ..]);
+        frames.slice_mut(s![1..LENGTH, ..]).assign(&between);
+        frames
+    }
+
+    /// The motions in rows.
+    fn figure(&self, motions: &[Named]) -> anyhow::Result<String> {
+        let rows = motions.iter().map(|(label, kind, frames)| MotionRow {
+            label: (*label).into(),
+            frames: frames.rows().into_iter().map(world_positions).collect(),
+            generated: *kind != MotionKind::Recorded,
+        });
         let figure = MotionFigure {
             title: format!("{self}"),
-            rows: vec![
-                truth,
-                row("Interpolation", interpolated),
-                row("Small whole model", predicted),
-            ],
+            rows: rows.collect(),
             keyframes: vec![0, LENGTH],
             every: EVERY,
         };
         Ok(figure.svg()?)
     }
+
+    /// The motions in the viewer.
+    fn viewer(&self, motions: &[Named]) -> anyhow::Result<String> {
+        let motions = motions
+            .iter()
+            .map(|(name, kind, frames)| ViewerMotion::from_features(*name, *kind, frames.view()));
+        let keyframes = [0, LENGTH].map(|frame| ViewerKeyframe {
+            frame,
+            positions: world_positions(self.recorded.row(frame)),
+        });
+        let viewer = Viewer {
+            title: format!("{self}"),
+            frame_time: self.clip.clip.frame_time,
+            motions: motions.collect(),
+            keyframes: keyframes.to_vec(),
+            asked: Some(Asked::new(
+                self.request.root_trajectory.view(),
+                self.request.velocity_factors.view(),
+            )),
+        };
+        Ok(viewer.html()?)
+    }
+}
+
+/// What a motion is called, where it comes from, its frames `[N + 1, 149 or 154]`.
+type Named = (&'static str, MotionKind, Array2<f64>);
+
+/// Where the showcase goes.
+pub struct ShowcaseFiles {
+    pub figure: PathBuf,
+    pub viewer: PathBuf,
+    pub bvh: PathBuf,
 }
 
 impl fmt::Display for Showcase<'_> {
