@@ -3,7 +3,8 @@
 use glam::DVec3;
 use keydance::motion::{DANCE_PARENTS, JOINTS};
 use keydance::report::{
-    FigureError, LossSeries, LrpSeries, MotionFigure, MotionRow, loss_curve, lrp_curve,
+    FigureError, LossSeries, LrpSeries, MotionFigure, MotionRow, PathView, Placing, RootPaths,
+    Shown, loss_curve, lrp_curve,
 };
 use roxmltree::{Document, Node};
 
@@ -24,10 +25,8 @@ fn dancers(frames: usize, lean: f64) -> Vec<[DVec3; JOINTS]> {
 }
 
 fn figure() -> MotionFigure {
-    let row = |label: &str, lean, generated| MotionRow {
-        label: label.to_string(),
-        frames: dancers(21, lean),
-        generated,
+    let row = |label: &str, lean, generated| {
+        MotionRow::between_keyframes(label, dancers(21, lean), generated)
     };
     MotionFigure {
         title: "N = 20 <of> \"a & b\"".into(),
@@ -36,8 +35,9 @@ fn figure() -> MotionFigure {
             row("Interpolation", 3.0, true),
             row("Whole model", -3.0, true),
         ],
-        keyframes: vec![0, 20],
-        every: 6,
+        caption: String::new(),
+        shown: Shown::Every(6),
+        placing: Placing::OnFirstPath,
     }
 }
 
@@ -173,6 +173,91 @@ fn rows_that_do_not_show_the_same_frames_are_an_error() {
         ..figure()
     };
     assert!(matches!(empty.svg(), Err(FigureError::Empty { .. })));
+}
+
+#[test]
+fn rows_of_unlike_length_show_as_many_dancers_on_their_own_paths_and_number_their_own_frames() {
+    let rows = [20, 50].map(|frames| {
+        MotionRow::between_keyframes(format!("N = {frames}"), dancers(frames + 1, 0.0), true)
+    });
+    let figure = MotionFigure {
+        rows: rows.to_vec(),
+        shown: Shown::Count(6),
+        placing: Placing::OnOwnPath,
+        ..figure()
+    };
+    let svg = figure.svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let rows = groups(&document, "row");
+    for (row, last) in rows.iter().zip(["20", "50"]) {
+        let of = |class: &str| {
+            let of = |node: &Node| node.attribute("class") == Some(class);
+            row.descendants().filter(of).count()
+        };
+        assert_eq!((of("keyframe"), of("generated")), (2, 4));
+        assert!(row.descendants().any(|node| node.text() == Some(last)));
+    }
+}
+
+#[test]
+fn marked_parts_are_blue_between_the_keyframes_only() {
+    let mut figure = figure();
+    figure.rows.truncate(1);
+    figure.rows[0].generated = true;
+    figure.rows[0].marked = [false, true, false, true, false];
+    let svg = figure.svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let (amber, blue) = ("#ffc21a", "#3f86e0");
+    let bones = |node: &Node, colour: &str| {
+        let of_colour = |part: &Node| part.attribute("stroke") == Some(colour);
+        node.descendants().filter(of_colour).count()
+    };
+    for dancer in groups(&document, "generated") {
+        // Left leg and right arm: four bones each.
+        assert_eq!((bones(&dancer, blue), bones(&dancer, amber)), (8, 15));
+    }
+    for dancer in groups(&document, "keyframe") {
+        assert_eq!(bones(&dancer, blue), 0);
+    }
+}
+
+#[test]
+fn root_trajectories_share_a_scale_and_the_caption_stands_under_the_figure() {
+    let mut figure = figure();
+    figure.caption = "A caption that says <what> is seen. ".repeat(12);
+    let target: Vec<DVec3> = (0..21)
+        .map(|t| DVec3::new(5.0 * f64::from(t), 90.0, 0.0))
+        .collect();
+    for (row, reach) in figure.rows.iter_mut().zip([1.0, 1.0, 0.5]) {
+        row.paths = Some(RootPaths {
+            view: PathView::Above,
+            target: target.clone(),
+            generated: target.iter().map(|place| *place * reach).collect(),
+        });
+    }
+    let svg = figure.svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let width = |panel: &Node| {
+        let line = panel
+            .children()
+            .filter(|node| node.has_tag_name("polyline"))
+            .nth(1);
+        let points = line.unwrap().attribute("points").unwrap().to_string();
+        let x = |point: &str| -> f64 { point.split_once(',').unwrap().0.parse().unwrap() };
+        let xs: Vec<f64> = points.split(' ').map(x).collect();
+        xs[xs.len() - 1] - xs[0]
+    };
+    let panels = groups(&document, "root");
+    assert_eq!(panels.len(), 3);
+    assert!((width(&panels[0]) - 2.0 * width(&panels[2])).abs() < 0.1);
+    let caption: Vec<&str> = groups(&document, "caption")[0]
+        .descendants()
+        .filter(|node| node.is_text())
+        .filter_map(|node| node.text().map(str::trim))
+        .filter(|text| !text.is_empty())
+        .collect();
+    assert!(caption.len() > 1, "long captions break");
+    assert_eq!(caption.join(" "), figure.caption.trim());
 }
 
 fn losses() -> Vec<LossSeries> {

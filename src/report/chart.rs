@@ -60,6 +60,8 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     pub title: String,
+    /// One line under the chart; empty for none.
+    pub caption: String,
     pub x: Axis,
     pub y: Axis,
     pub lines: Vec<Line>,
@@ -121,6 +123,7 @@ impl Chart {
                 .collect();
             draw_line(&mut svg, line, &places, index);
         }
+        svg.caption(&self.caption);
         Ok(svg.finish())
     }
 }

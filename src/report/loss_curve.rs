@@ -33,6 +33,7 @@ pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureEr
     });
     Chart {
         title: title.to_string(),
+        caption: String::new(),
         x: Axis {
             label: "training (frame-steps)".into(),
             scale: Scale::Linear,

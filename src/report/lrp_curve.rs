@@ -39,6 +39,7 @@ pub fn lrp_curve(title: &str, models: &[LrpSeries]) -> Result<String, FigureErro
     }
     Chart {
         title: title.to_string(),
+        caption: String::new(),
         x: Axis {
             label: "transition length N (frames at 30 fps)".into(),
             scale: Scale::Linear,

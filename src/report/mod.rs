@@ -4,16 +4,19 @@
 
 pub mod camera;
 pub mod chart;
+mod dancer;
 pub mod loss_curve;
 pub mod lrp_curve;
 pub mod motion_figure;
+pub mod root_panel;
 pub mod svg;
 pub mod validation_curve;
 pub mod viewer;
 
 pub use loss_curve::{LossSeries, loss_curve};
 pub use lrp_curve::{LrpSeries, lrp_curve};
-pub use motion_figure::{MotionFigure, MotionRow};
+pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
+pub use root_panel::{PathView, RootPaths};
 pub use validation_curve::{ValidationSeries, validation_curve};
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 

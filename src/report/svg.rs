@@ -151,6 +151,28 @@ impl Svg {
         ));
     }
 
+    /// Sets a caption under the figure, which grows for it; lines break at the figure's width. An empty one changes nothing.
+    pub fn caption(&mut self, caption: &str) {
+        const SIZE: f64 = 13.0;
+        const LINE: f64 = 18.0;
+        if caption.is_empty() {
+            return;
+        }
+        // 0.54 em is what a letter takes in the mean, a little generously.
+        let fits = ((self.width - 32.0) / (0.54 * SIZE)) as usize;
+        let lines = wrapped(caption, fits.max(20));
+        let top = self.height;
+        let room = LINE * lines.len() as f64 + 14.0;
+        self.rectangle([0.0, top], [self.width, room], "#ffffff");
+        self.height += room;
+        self.begin_group("caption");
+        for (index, line) in lines.iter().enumerate() {
+            let at = [16.0, top + 10.0 + LINE * index as f64];
+            self.text(at, line, Font::new(SIZE, "#222222", Anchor::Start));
+        }
+        self.end_group();
+    }
+
     /// Opens a group that other programs find by its class; close it with [`Svg::end_group`].
     pub fn begin_group(&mut self, class: &str) {
         self.push(format_args!(r#"<g class="{}">"#, escape(class)));
@@ -174,6 +196,21 @@ impl Svg {
     fn push(&mut self, element: std::fmt::Arguments) {
         let _ = writeln!(self.body, "{element}");
     }
+}
+
+/// Words in lines of at most `most` characters; a longer word has a line of its own.
+pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    lines
 }
 
 /// Text as content or attribute value of XML and HTML; characters that XML forbids become U+FFFD.

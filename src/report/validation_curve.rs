@@ -28,6 +28,7 @@ pub fn validation_curve(title: &str, lengths: &[ValidationSeries]) -> Result<Str
     });
     Chart {
         title: title.to_string(),
+        caption: String::new(),
         x: Axis {
             label: "training (frame-steps)".into(),
             scale: Scale::Linear,

@@ -13,7 +13,8 @@ use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
 use crate::report::{
-    Asked, MotionFigure, MotionKind, MotionRow, Viewer, ViewerKeyframe, ViewerMotion,
+    Asked, MotionFigure, MotionKind, MotionRow, Placing, Shown, Viewer, ViewerKeyframe,
+    ViewerMotion,
 };
 use crate::synthesis::{SynthesisedMotion, transition_motion};
 use crate::training::replace_file;
@@ -103,16 +104,16 @@ impl<'d> Showcase<'d> {
 
     /// The motions in rows.
     fn figure(&self, motions: &[Named]) -> anyhow::Result<String> {
-        let rows = motions.iter().map(|(label, kind, frames)| MotionRow {
-            label: (*label).into(),
-            frames: frames.rows().into_iter().map(world_positions).collect(),
-            generated: *kind != MotionKind::Recorded,
+        let rows = motions.iter().map(|(label, kind, frames)| {
+            let frames = frames.rows().into_iter().map(world_positions).collect();
+            MotionRow::between_keyframes(*label, frames, *kind != MotionKind::Recorded)
         });
         let figure = MotionFigure {
             title: format!("{self}"),
+            caption: String::new(),
             rows: rows.collect(),
-            keyframes: vec![0, LENGTH],
-            every: EVERY,
+            shown: Shown::Every(EVERY),
+            placing: Placing::OnFirstPath,
         };
         Ok(figure.svg()?)
     }
