@@ -1,5 +1,6 @@
 //! Evaluation: the paper's three scores of a model, by a frozen protocol, and the tables that set them beside the paper's.
 
+pub mod effect;
 pub mod metrics;
 pub mod paper;
 pub mod protocol;
@@ -7,6 +8,7 @@ pub mod scores;
 pub mod tables;
 pub mod window_request;
 
+pub use effect::{FOLLOWED, Response, body_distance, mean_velocity_factors, root_response};
 pub use metrics::{WindowScores, window_scores};
 pub use protocol::{EvaluationError, Outcome, Protocol, SkippedClip};
 pub use scores::{Evaluation, LengthScores};
