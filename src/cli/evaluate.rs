@@ -12,9 +12,9 @@ use super::evaluation_record::{EvaluatedData, EvaluationRecord};
 use super::subject::Subject;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::data::{DataConfig, Dataset};
+use crate::data::Dataset;
 use crate::evaluation::{Protocol, TableRow, terminal_tables};
-use crate::training::{ExperimentConfig, RunFolder, replace_file};
+use crate::training::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -111,40 +111,6 @@ impl EvaluateArgs {
 }
 
 impl Subject {
-    /// Refuses data that the run was not trained on: its training clips may be test clips there.
-    fn check_data(&self, dataset: &Dataset, folder: &Path) -> anyhow::Result<()> {
-        let Some(run) = &self.run else {
-            return Ok(());
-        };
-        let trained = run.config()?.data;
-        let parts = |data: &DataConfig| (data.split.clone(), data.validation_share);
-        if parts(&trained) != parts(&self.config.data) {
-            let config = |data| ExperimentConfig {
-                data,
-                ..ExperimentConfig::default()
-            };
-            let differences = config(trained).differences(&config(self.config.data.clone()))?;
-            anyhow::bail!(
-                "{} was trained on other clips of the data ({}; values there, values now), so some of these may be its training \
-                 clips; give --other-data to evaluate it on them all the same",
-                run.path().display(),
-                differences.join("; ")
-            );
-        }
-        if let Some(manifest) = run.manifest()?
-            && manifest.data_digest != dataset.digest
-        {
-            anyhow::bail!(
-                "{} was trained on data with digest {}, {} has digest {}; give --other-data to evaluate it there all the same",
-                manifest.name,
-                manifest.data_digest,
-                folder.display(),
-                dataset.digest
-            );
-        }
-        Ok(())
-    }
-
     /// The folder that keeps the scores, made where a config asks for one.
     fn folder<'a>(&'a self, out: Option<&'a Path>) -> anyhow::Result<Option<&'a Path>> {
         if let Some(run) = &self.run {

@@ -122,7 +122,9 @@ mod tests {
     }
 
     fn target(frames: usize, root: f64) -> Array2<f64> {
-        moving(frames, 0.0, root).slice(s![.., ROOT_POSITION]).to_owned()
+        moving(frames, 0.0, root)
+            .slice(s![.., ROOT_POSITION])
+            .to_owned()
     }
 
     #[test]
@@ -142,10 +144,9 @@ mod tests {
 
     #[test]
     fn responses_to_less_and_to_more_do_not_cancel() {
-        let mean = Response::mean([(-2.0, -1.0), (2.0, 1.0)].map(|(asked, measured)| Response {
-            asked,
-            measured,
-        }));
+        let mean = Response::mean(
+            [(-2.0, -1.0), (2.0, 1.0)].map(|(asked, measured)| Response { asked, measured }),
+        );
         assert_eq!((mean.asked, mean.measured), (2.0, 1.0));
     }
 
