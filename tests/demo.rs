@@ -57,6 +57,8 @@ fn the_reduced_demo_ends_ahead_of_interpolation_and_writes_every_result() {
         let text = fs::read_to_string(out.join(figure)).unwrap();
         roxmltree::Document::parse(&text).unwrap();
     }
+    let page = fs::read_to_string(out.join("viewer.html")).unwrap();
+    assert!(page.contains("Small whole model") && page.len() < 1_000_000);
     let motion = bvh::read(&out.join("transition.bvh")).unwrap().to_clip();
     assert_eq!(motion.poses.len(), 101);
     assert!(motion.skeleton.is_dance_skeleton());

@@ -11,6 +11,7 @@ mod evaluate;
 mod evaluation_record;
 mod export_batch;
 mod features;
+mod figures;
 mod generate;
 mod gradcheck;
 mod progress;
@@ -20,6 +21,7 @@ mod subject;
 mod tables;
 mod threads;
 mod train;
+mod viewer_page;
 mod watched;
 
 use std::process::ExitCode;
@@ -56,6 +58,7 @@ enum Command {
     ExportBatch(export_batch::ExportBatchArgs),
     /// Write the features of every frame of a BVH file as one array
     Features(features::FeaturesArgs),
+    Figures(figures::FiguresArgs),
     Generate(Box<generate::GenerateArgs>),
     /// Compare the gradient of a model's whole loss with central differences
     Gradcheck(gradcheck::GradcheckArgs),
@@ -84,6 +87,7 @@ impl Cli {
             Command::Bvh(args) => bvh::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
             Command::Features(args) => features::run(args)?,
+            Command::Figures(args) => figures::run(args)?,
             Command::Generate(args) => generate::run(*args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::Train(args) => return train::run(args),

@@ -127,7 +127,7 @@ impl MotionFigure {
     pub fn svg(&self) -> Result<String, FigureError> {
         self.check()?;
         let rows = self.placed();
-        let layout = Layout::of(&rows);
+        let layout = Layout::of(&rows, &self.title);
         // Rows that show the same frames share one axis below.
         let shared = rows.iter().all(|row| row.shown == rows[0].shown);
         let axis = if shared { 0.0 } else { 18.0 };
@@ -272,7 +272,7 @@ impl MotionFigure {
 }
 
 impl Layout {
-    fn of(rows: &[PlacedRow]) -> Self {
+    fn of(rows: &[PlacedRow], title: &str) -> Self {
         let drawn = || rows.iter().flat_map(|row| &row.dancers);
         let reach = |measure: fn(&Drawn) -> f64| drawn().map(measure).fold(0.0, f64::max);
         let aside = reach(|drawn| drawn.left).max(reach(|drawn| drawn.right));
@@ -290,6 +290,8 @@ impl Layout {
         } else {
             edge
         };
+        // The title's bold letters take less than 11 pixels each.
+        let width = width.max(32.0 + 11.0 * title.chars().count() as f64);
         Self {
             start,
             spacing,

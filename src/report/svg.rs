@@ -198,16 +198,21 @@ impl Svg {
     }
 }
 
-/// Words in lines of at most `most` characters; a longer word has a line of its own.
+/// Text in lines of at most `most` characters, broken at spaces and, as names of files and runs need it, behind `_` and `-`. What cannot be broken
+/// has a line of its own. A no-break space holds.
 pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
-                line.push(' ');
-                line.push_str(word);
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        for (index, piece) in word.split_inclusive(['_', '-']).enumerate() {
+            let space = if index == 0 { " " } else { "" };
+            let length = space.len() + piece.chars().count();
+            match lines.last_mut() {
+                Some(line) if line.chars().count() + length <= most => {
+                    line.push_str(space);
+                    line.push_str(piece);
+                }
+                _ => lines.push(piece.to_string()),
             }
-            _ => lines.push(word.to_string()),
         }
     }
     lines

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
+use ndarray::{ArrayView2, s};
 
 use crate::data::{DanceClip, DataConfig};
 use crate::motion::Mapping;
@@ -189,6 +190,16 @@ impl Keyframes {
     pub fn motion(&self) -> Option<&DanceClip> {
         let (path, _) = self.motion.as_ref()?;
         Some(&self.sources[path].clip)
+    }
+
+    /// What `--motion` has in the frames of a request, `[F, 154]`; none where the request's keyframes stand at other distances.
+    pub fn recorded(&self, request: &SequenceRequest) -> Option<ArrayView2<'_, f64>> {
+        let (path, first) = self.motion.as_ref()?;
+        let times = self.keyframes.iter().map(|keyframe| keyframe.time);
+        let frames = *first..*first + request.frames();
+        let clip = &self.sources[path].clip;
+        (times.eq(request.times()) && frames.end <= clip.frames())
+            .then(|| clip.features.slice(s![frames, ..]))
     }
 
     /// The channels of the first keyframe's file, where they can hold the result.

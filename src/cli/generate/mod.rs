@@ -15,9 +15,13 @@ use clap::Args;
 
 use super::evaluation_record::write_json;
 use super::subject::Subject;
+use super::viewer_page::{Shown, viewer_page};
+use crate::models::interpolation::Interpolation;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
-use crate::synthesis::{SynthesisOptions, control_warnings, synthesise};
+use crate::report::MotionKind;
+use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, control_warnings, synthesise};
+use crate::training::replace_file;
 use keyframes::{KeyframeArgs, Keyframes};
 use summary::Summary;
 use trajectory::TrajectoryArgs;
@@ -44,6 +48,10 @@ pub struct GenerateArgs {
     /// Pin the feet where the model predicts contact
     #[arg(long)]
     foot_cleanup: bool,
+    /// Show the motion beside interpolation and, where keyframes come from --motion at their own distances, the recorded motion: one HTML page
+    /// that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    viewer: Option<PathBuf>,
     /// Write what is printed here, too, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -67,13 +75,60 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let name = args.out.file_name().unwrap_or_default().to_string_lossy();
     let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
     let document = document(&sequence.clip, keyframes.channels())?;
+    let page = match &args.viewer {
+        Some(_) => Some(page(&subject, &keyframes, &request, &sequence, &options)?),
+        None => None,
+    };
     bvh::write(&args.out, &document)?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+        replace_file(path, page.as_bytes())?;
+    }
     let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
     if let Some(path) = &args.json {
         write_json(path, &summary)?;
     }
     writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())
+}
+
+/// The viewer's page: the recorded motion where it runs along, interpolation under the same controls beside a trained model, what was generated.
+fn page(
+    subject: &Subject,
+    keyframes: &Keyframes,
+    request: &SequenceRequest,
+    sequence: &Sequence,
+    options: &SynthesisOptions,
+) -> anyhow::Result<String> {
+    let interpolation = Interpolation {
+        contact_threshold: subject.config.data.contact_threshold,
+    };
+    let name = "Interpolation";
+    // Not beside itself.
+    let interpolated = match subject.ranges {
+        Some(_) => Some(synthesise(&interpolation, request, options, name)?),
+        None => None,
+    };
+    let mut shown = Vec::new();
+    if let Some(frames) = keyframes.recorded(request) {
+        shown.push(Shown {
+            name: "Ground truth",
+            kind: MotionKind::Recorded,
+            frames,
+        });
+    }
+    if let Some(interpolated) = &interpolated {
+        shown.push(Shown {
+            name,
+            kind: MotionKind::Other,
+            frames: interpolated.features.view(),
+        });
+    }
+    shown.push(Shown {
+        name: &subject.config.name,
+        kind: MotionKind::Model,
+        frames: sequence.features.view(),
+    });
+    Ok(viewer_page(&sequence.clip.name, request, &shown)?)
 }
 
 /// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.

@@ -1,0 +1,96 @@
+//! Figure 10: the same keyframes with more and more frames between them.
+
+use super::output::{Figure, Numbers};
+use super::root::mean_body_distance;
+use super::stage::{Generated, Stage};
+use super::velocity::{asked, mean_parts};
+use super::wording::{mean, percent};
+use crate::evaluation::{FOLLOWED, mean_velocity_factors};
+use crate::models::TransitionModel;
+use crate::motion::PARTS;
+use crate::report::{MotionFigure, MotionRow, Placing, Shown};
+use ndarray::s;
+
+/// Transition lengths of the paper's figure, frames.
+const LENGTHS: [usize; 4] = [100, 150, 200, 250];
+/// Dancers a row, as in the paper.
+const DANCERS: usize = 25;
+
+/// The trajectory is gone in more time, the velocity factors keep their values.
+pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<Figure> {
+    let name = model.name();
+    let mut numbers = Numbers::default();
+    let mut rows = Vec::new();
+    let mut results: Vec<Vec<Generated>> = Vec::new();
+    let mut said = Vec::new();
+    let mut stalled = Vec::new();
+    for length in LENGTHS {
+        let generated = stage.generate(model, |request| request.with_length(length))?;
+        let label = format!("N = {length}");
+        rows.push(MotionRow::between_keyframes(
+            &label,
+            generated[0].drawn(),
+            true,
+        ));
+        let [whole, second] = [0, length / 2].map(|from| {
+            mean_parts(&generated, |generated| {
+                mean_velocity_factors(generated.frames.slice(s![from.., ..]))
+            })
+        });
+        let wanted = mean_parts(&generated, |generated| asked(&generated.request));
+        let share = |of: [f64; PARTS]| mean(&of) / mean(&wanted);
+        numbers.add_parts(&label, "velocity_factor_mean_asked", wanted, "cm/frame");
+        numbers.add_parts(&label, "velocity_factor_mean", whole, "cm/frame");
+        numbers.add_parts(
+            &label,
+            "velocity_factor_mean_second_half",
+            second,
+            "cm/frame",
+        );
+        numbers.add(&label, "velocity_factor_share_of_asked", share(whole), "");
+        numbers.add(
+            &label,
+            "velocity_factor_share_of_asked_second_half",
+            share(second),
+            "",
+        );
+        if let Some(first) = results.first() {
+            let distance = mean_body_distance(first, &generated);
+            numbers.add(&label, "body_distance_from_N_100", distance, "cm");
+            said.push(format!("{distance:.1} cm at {length}"));
+        }
+        if share(second) < FOLLOWED {
+            stalled.push((length, share(second)));
+        }
+        results.push(generated);
+    }
+    numbers.add("all windows", "windows", stage.windows().len() as f64, "");
+    let ending = if stalled.is_empty() {
+        format!(
+            "{name} keeps moving: at every length its second half has a third of the speed asked for or more"
+        )
+    } else {
+        let stalled: Vec<String> = stalled
+            .iter()
+            .map(|(length, share)| format!("N = {length} ({})", percent(*share)))
+            .collect();
+        format!(
+            "{name} stalls: its second half has less than a third of the speed asked for at {}",
+            stalled.join(", ")
+        )
+    };
+    let caption = format!(
+        "Figure 10. The same keyframes with 100, 150, 200 and 250 frames between them, {DANCERS} frames of each: {} the bodies are apart from those at 100, at the same share \
+         of the way, by {} a joint; {ending}.",
+        stage.measured_on(),
+        said.join(", ")
+    );
+    let drawing = MotionFigure {
+        title: stage.title("Figure 10", name),
+        caption,
+        rows,
+        shown: Shown::Count(DANCERS),
+        placing: Placing::OnOwnPath,
+    };
+    Figure::of_dancers("figure_10", drawing, numbers)
+}
