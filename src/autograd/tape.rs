@@ -60,6 +60,7 @@ pub struct Tape<'a, T: Real> {
     nodes: Vec<Node<T>>,
     leaves: Vec<Option<Var>>,
     recording: bool,
+    frozen: bool,
     dropout_key: Option<u64>,
     trace: bool,
 }
@@ -77,6 +78,7 @@ impl<'a, T: Real> Tape<'a, T> {
             workspace,
             nodes,
             recording: true,
+            frozen: false,
             dropout_key: None,
             trace: false,
         }
@@ -89,13 +91,13 @@ impl<'a, T: Real> Tape<'a, T> {
         tape
     }
 
-    /// Turns dropout on; all its masks follow from this key and the order of the operations.
+    /// Turns dropout and noise on; all masks and draws follow from this key and the order of the operations.
     pub fn with_dropout(mut self, key: u64) -> Self {
         self.set_dropout(Some(key));
         self
     }
 
-    /// Turns dropout on with a key, or off, for the operations that follow.
+    /// Turns dropout and noise on with a key, or off, for the operations that follow.
     pub fn set_dropout(&mut self, key: Option<u64>) {
         self.dropout_key = key;
     }
@@ -111,7 +113,7 @@ impl<'a, T: Real> Tape<'a, T> {
         self.recording
     }
 
-    /// A key for the masks of the next operation, where dropout is on.
+    /// A key for the draws of the next operation, where dropout is on.
     pub(super) fn next_dropout_key(&self) -> Option<u64> {
         self.dropout_key.map(|key| {
             let mut x = key ^ (self.nodes.len() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -131,6 +133,14 @@ impl<'a, T: Real> Tape<'a, T> {
         let mut buffer = self.workspace.take(shape.iter().product());
         fill(&mut buffer);
         self.push("constant", &[], shape, buffer, false, None)
+    }
+
+    /// The numbers of `x` as a constant: no gradient goes back through it.
+    pub fn detach(&mut self, x: Var) -> Var {
+        let shape = self.shape(x).to_vec();
+        let mut buffer = self.workspace.take(self.values(x).len());
+        buffer.copy_from_slice(self.values(x));
+        self.push("detach", &[x], &shape, buffer, false, None)
     }
 
     /// A value that is given and wants a gradient of its own, see [`Tape::backward_from`].
@@ -154,20 +164,30 @@ impl<'a, T: Real> Tape<'a, T> {
         Var(self.nodes.len() as u32 - 1)
     }
 
-    /// A block of a parameter, the same value however often it is asked for.
+    /// Builds with all parameters held: gradients go back through what `build` computes of them, but none to the parameters.
+    pub fn frozen<R>(&mut self, build: impl FnOnce(&mut Self) -> R) -> R {
+        let before = std::mem::replace(&mut self.frozen, true);
+        let result = build(self);
+        self.frozen = before;
+        result
+    }
+
+    /// A block of a parameter, the same value however often it is asked for; inside [`Tape::frozen`] a constant.
     pub fn block(&mut self, id: BlockId) -> Var {
-        if let Some(var) = self.leaves[id.0] {
+        if let Some(var) = self.leaves[id.0].filter(|_| !self.frozen) {
             return var;
         }
         self.nodes.push(Node {
             name: "parameter",
             value: Value::Block(id),
             inputs: Vec::new(),
-            needs_gradient: self.recording,
+            needs_gradient: self.recording && !self.frozen,
             operation: None,
         });
         let var = Var(self.nodes.len() as u32 - 1);
-        self.leaves[id.0] = Some(var);
+        if !self.frozen {
+            self.leaves[id.0] = Some(var);
+        }
         var
     }
 

@@ -1,4 +1,4 @@
-//! Fully connected layers with PReLU between them.
+//! Fully connected layers with an activation between them.
 
 use rand::Rng;
 
@@ -8,18 +8,47 @@ use crate::autograd::{AutogradError, BlockId, Real, Tape, Var};
 /// The slope of a PReLU before training, as in PyTorch and in He et al. 2015.
 const SLOPE: f64 = 0.25;
 
-/// Linear, PReLU, Linear, PReLU, ..; named as a `torch.nn.Sequential` names them: `{name}.0`, `{name}.1`, ..
+/// What stands behind a layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activation {
+    /// With one learned slope a layer.
+    Prelu,
+    Plu,
+    Relu,
+}
+
+/// Linear, activation, Linear, activation, ..; named as a `torch.nn.Sequential` names them: `{name}.0`, `{name}.1`, ..
 #[derive(Debug, Clone)]
 pub struct Mlp {
-    layers: Vec<(Linear, Option<BlockId>)>,
+    layers: Vec<(Linear, Step)>,
+}
+
+/// An activation with its weights.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Identity,
+    Prelu(BlockId),
+    Plu,
+    Relu,
 }
 
 impl Mlp {
-    /// Layers from `sizes[0]` to `sizes[1]` to ..; the last one has a PReLU of its own where `activate_last` says so.
+    /// Layers with PReLU, see [`Mlp::with_activation`].
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: &[usize],
+        activate_last: bool,
+    ) -> Self {
+        Self::with_activation(init, name, sizes, Activation::Prelu, activate_last)
+    }
+
+    /// Layers from `sizes[0]` to `sizes[1]` to ..; the last one has an activation of its own where `activate_last` says so.
+    pub fn with_activation<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        sizes: &[usize],
+        activation: Activation,
         activate_last: bool,
     ) -> Self {
         let last = sizes.len().saturating_sub(2);
@@ -28,11 +57,16 @@ impl Mlp {
             .enumerate()
             .map(|(k, pair)| {
                 let linear = Linear::new(init, &format!("{name}.{}", 2 * k), pair[0], pair[1]);
-                let slope = (k < last || activate_last).then(|| {
-                    let slope = format!("{name}.{}.weight", 2 * k + 1);
-                    init.constant(slope, &[1], SLOPE).1
-                });
-                (linear, slope)
+                let step = match activation {
+                    _ if k == last && !activate_last => Step::Identity,
+                    Activation::Plu => Step::Plu,
+                    Activation::Relu => Step::Relu,
+                    Activation::Prelu => {
+                        let slope = format!("{name}.{}.weight", 2 * k + 1);
+                        Step::Prelu(init.constant(slope, &[1], SLOPE).1)
+                    }
+                };
+                (linear, step)
             })
             .collect();
         Self { layers }
@@ -47,11 +81,18 @@ impl Mlp {
         tape: &mut Tape<'_, T>,
         mut x: Var,
     ) -> Result<Var, AutogradError> {
-        for (linear, slope) in &self.layers {
-            x = linear.forward(tape, x)?;
-            if let Some(slope) = *slope {
-                let slope = tape.block(slope);
-                x = tape.prelu(x, slope)?;
+        for (linear, step) in &self.layers {
+            x = match *step {
+                Step::Relu => linear.forward_relu(tape, x)?,
+                _ => linear.forward(tape, x)?,
+            };
+            match *step {
+                Step::Prelu(slope) => {
+                    let slope = tape.block(slope);
+                    x = tape.prelu(x, slope)?;
+                }
+                Step::Plu => x = tape.plu(x),
+                Step::Identity | Step::Relu => {}
             }
         }
         Ok(x)

@@ -14,7 +14,7 @@ pub use attention::{MultiHeadAttention, NarrowAttention};
 pub use init::Initialiser;
 pub use linear::Linear;
 pub use lstm::Lstm;
-pub use mlp::Mlp;
+pub use mlp::{Activation, Mlp};
 pub use norm::LayerNorm;
 pub use positions::sinusoidal_positions;
 pub use transformer::{TransformerDecoderLayer, TransformerEncoderLayer, TransformerSizes};

@@ -30,6 +30,7 @@ macro_rules! operations {
 }
 
 operations!(
+    abs,
     add,
     add_layer_norm,
     affine,
@@ -39,11 +40,15 @@ operations!(
     concat,
     dropout,
     exp,
+    forward_kinematics,
     layer_norm,
     linear,
     lstm_cell,
     matmul,
     mul,
+    noise,
+    normalise,
+    plu,
     prelu,
     query_attention,
     relu,

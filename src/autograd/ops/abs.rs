@@ -1,0 +1,42 @@
+//! Absolute value.
+//!
+//! ```text
+//! y = |x|; dX = dY sign(x), 0 where x is 0.
+//! ```
+
+use super::unary::unary;
+use crate::autograd::{Real, Tape, Var};
+
+impl<T: Real> Tape<'_, T> {
+    /// |x|, elementwise.
+    pub fn abs(&mut self, x: Var) -> Var {
+        unary(
+            self,
+            "abs",
+            x,
+            |values| values.iter_mut().for_each(|x| *x = x.abs()),
+            |x, _| {
+                if x > T::zero() {
+                    T::one()
+                } else if x < T::zero() {
+                    -T::one()
+                } else {
+                    T::zero()
+                }
+            },
+        )
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), any::<u64>())
+            .prop_map(|(x, seed)| case(&[&x], seed, 0.01, |tape, v| Ok(tape.abs(v[0]))))
+            .boxed()
+    }
+}

@@ -1,0 +1,59 @@
+//! Normal noise.
+//!
+//! ```text
+//! y = x + deviation n, n drawn from N(0, 1) for each number; dX = dY.
+//! ```
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::autograd::{Backward, Operation, Real, Tape, Var};
+
+struct Noise {
+    x: Var,
+}
+
+impl<T: Real> Operation<T> for Noise {
+    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
+        if let Some(target) = context.target(self.x) {
+            target.add(|i| dy[i]);
+        }
+    }
+}
+
+impl<T: Real> Tape<'_, T> {
+    /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's dropout; `x` itself where dropout is
+    /// off.
+    pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
+        let Some(key) = self.next_dropout_key().filter(|_| deviation > 0.0) else {
+            return x;
+        };
+        let shape = self.shape(x).to_vec();
+        let mut y = self.take(self.values(x).len());
+        let mut rng = ChaCha8Rng::seed_from_u64(key);
+        for (y, &x) in y.iter_mut().zip(self.values(x)) {
+            let drawn: f64 = StandardNormal.sample(&mut rng);
+            *y = x + T::from_f64(deviation * drawn);
+        }
+        self.record("noise", &[x], &shape, y, || Noise { x })
+    }
+}
+
+#[cfg(test)]
+pub(super) mod gradient {
+    use proptest::prelude::*;
+
+    use crate::autograd::check::property::{Case, case, shapes};
+
+    pub fn cases() -> BoxedStrategy<Case> {
+        (shapes(), 0.0..2.0, any::<u64>())
+            .prop_map(|(x, deviation, seed)| {
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    tape.set_dropout(Some(seed));
+                    Ok(tape.noise(v[0], deviation))
+                })
+            })
+            .boxed()
+    }
+}
