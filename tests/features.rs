@@ -9,12 +9,14 @@ use assert_cmd::cargo::cargo_bin_cmd;
 use dance_clip::turning_clip;
 use glam::DVec3;
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
+use keydance::motion::facing::{facing_angles, facing_angles_between};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
     VELOCITY_FACTORS,
 };
 use keydance::motion::{FeatureConfig, FeatureError, features};
 use ndarray::{Array2, s};
+use proptest::prelude::*;
 
 const HIPS: DVec3 = DVec3::new(0.0, 90.0, 0.0);
 
@@ -198,5 +200,66 @@ fn the_binary_writes_the_same_numbers_as_float32() {
             .iter()
             .zip(&expected)
             .all(|(&found, &expected)| (f64::from(found) - expected).abs() < 1e-4)
+    );
+}
+
+/// World positions of the figure turning by the given angles.
+fn turning(angles: &[f64]) -> Vec<Vec<DVec3>> {
+    let clip = turning_clip("turning", angles.len(), |t| (HIPS, angles[t]));
+    let world = clip.poses.iter();
+    world
+        .map(|pose| pose.world_positions(&clip.skeleton))
+        .collect()
+}
+
+proptest! {
+    #[test]
+    fn facing_between_keyframes_begins_and_ends_with_theirs(
+        angles in prop::collection::vec(-9.0..9.0f64, 1..40),
+        known in prop::array::uniform2(-9.0..9.0f64),
+    ) {
+        let between = facing_angles_between(&turning(&angles), known, 20.0);
+        prop_assert_eq!(between.len(), angles.len());
+        prop_assert!((between[0] - known[0]).abs() < 1e-9 || angles.len() == 1);
+        let turns = (between[angles.len() - 1] - known[1]) / TAU;
+        prop_assert!((turns - turns.round()).abs() < 1e-9 || angles.len() == 1);
+    }
+}
+
+#[test]
+fn facing_between_keyframes_of_a_recorded_clip_is_that_of_the_whole_clip() {
+    // Turns to and fro with a full turn in the middle, as dancers do.
+    let angle = |t: usize| {
+        let t = t as f64;
+        0.8 * (t / 23.0).sin() + 0.3 * (t / 7.0).sin() + TAU / (1.0 + (-(t - 200.0) / 12.0).exp())
+    };
+    let angles: Vec<f64> = (0..400).map(angle).collect();
+    let world = turning(&angles);
+    let whole = facing_angles(&world, 20.0);
+    let (mut between, mut alone, mut count) = (0.0, 0.0, 0);
+    for length in [5, 30, 100] {
+        for start in (0..400 - length).step_by(20) {
+            let window = &world[start..=start + length];
+            let known = [whole[start], whole[start + length]];
+            let pairs = [
+                facing_angles_between(window, known, 20.0),
+                facing_angles(window, 20.0),
+            ]
+            .map(|found| {
+                let errors = found.iter().zip(&whole[start..]).map(|(a, b)| {
+                    let turns = (a - b) / TAU;
+                    (turns - turns.round()).abs() * TAU
+                });
+                errors.sum::<f64>() / (length + 1) as f64
+            });
+            between += pairs[0];
+            alone += pairs[1];
+            count += 1;
+        }
+    }
+    let (between, alone) = (between / f64::from(count), alone / f64::from(count));
+    assert!(
+        between < 0.04 && between < 0.25 * alone,
+        "{between} {alone} rad"
     );
 }

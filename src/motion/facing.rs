@@ -15,8 +15,51 @@ const LEFT_ARM: usize = 19;
 /// Gaussian of standard deviation `sigma` frames before its angle is taken. The first angle lies in (-pi, pi]; from there the angle
 /// is followed without jumps of 2 pi.
 pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
+    let (Some(first), Some(last)) = (world.first(), world.last()) else {
+        return Vec::new();
+    };
+    smooth_angles(world, [forward(first), forward(last)], sigma)
+}
+
+/// Facing angles of predicted frames between two keyframes whose own facing angles are known, `[N + 1]`, rad.
+///
+/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][24]`, cm; `start` and `target` are the
+/// facing angles of k1 and k2. [`facing_angles`] smooths over the frames before k1 and after k2 too; here those are not there, and
+/// the dancer is taken to face along `start` before k1 and along `target` after k2. What the smoothed angles of k1 and k2 then still
+/// differ from the known ones is taken off, at the keyframe whole and less from frame to frame, until nothing is left `sigma` frames
+/// (or N, where that is less) away. So the first angle is `start`, the last is `target` up to full turns, and in between the
+/// angles follow the frames' own bodies.
+pub fn facing_angles_between(
+    world: &[Vec<DVec3>],
+    [start, target]: [f64; 2],
+    sigma: f64,
+) -> Vec<f64> {
+    let (Some(first), Some(last)) = (world.first(), world.last()) else {
+        return Vec::new();
+    };
+    let along = |angle: f64, like: DVec2| DVec2::new(angle.sin(), angle.cos()) * like.length();
+    let ends = [along(start, forward(first)), along(target, forward(last))];
+    let angles = smooth_angles(world, ends, sigma);
+    let last = angles.len() - 1;
+    // Between -pi and pi, so that the first frame keeps the turns that `start` counts.
+    let missing = |known: f64, found: f64| (known - found) - ((known - found) / TAU).round() * TAU;
+    let (at_start, at_target) = (missing(start, angles[0]), missing(target, angles[last]));
+    let turns = start - angles[0] - at_start;
+    let reach = sigma.min(last as f64).max(f64::MIN_POSITIVE);
+    let share = |distance: usize| (1.0 - distance as f64 / reach).max(0.0);
+    angles
+        .iter()
+        .enumerate()
+        .map(|(time, angle)| {
+            angle + turns + at_start * share(time) + at_target * share(last - time)
+        })
+        .collect()
+}
+
+/// Angles of the smoothed forward directions, unwrapped; `ends` are the directions before the first frame and after the last.
+fn smooth_angles(world: &[Vec<DVec3>], ends: [DVec2; 2], sigma: f64) -> Vec<f64> {
     let forward: Vec<DVec2> = world.iter().map(|positions| forward(positions)).collect();
-    let mut angles: Vec<f64> = gaussian(&forward, sigma)
+    let mut angles: Vec<f64> = gaussian(&forward, ends, sigma)
         .into_iter()
         .map(|direction| direction.x.atan2(direction.y))
         .collect();
@@ -32,8 +75,8 @@ fn forward(positions: &[DVec3]) -> DVec2 {
     DVec2::new(forward.x, forward.z)
 }
 
-/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side, and the ends of the clip are held.
-fn gaussian(values: &[DVec2], sigma: f64) -> Vec<DVec2> {
+/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side; `before` and `after` stand beyond the ends.
+fn gaussian(values: &[DVec2], [before, after]: [DVec2; 2], sigma: f64) -> Vec<DVec2> {
     let radius = (4.0 * sigma + 0.5) as usize;
     let mut kernel: Vec<f64> = (0..=2 * radius)
         .map(|tap| {
@@ -49,7 +92,11 @@ fn gaussian(values: &[DVec2], sigma: f64) -> Vec<DVec2> {
                 .iter()
                 .enumerate()
                 .map(|(tap, &weight)| {
-                    values[(time + tap).saturating_sub(radius).min(values.len() - 1)] * weight
+                    let value = match (time + tap).checked_sub(radius) {
+                        None => before,
+                        Some(at) => values.get(at).copied().unwrap_or(after),
+                    };
+                    value * weight
                 })
                 .sum()
         })
@@ -75,7 +122,8 @@ mod tests {
         let expected_z = [1.7469826, 1.14805353, 1.3275359, 2.59391143, 4.42102501];
         let values =
             [[0.0, 3.0], [0.0, -1.0], [1.0, 0.0], [5.0, 0.0], [-2.0, 7.0]].map(DVec2::from_array);
-        for (time, smooth) in gaussian(&values, 1.5).into_iter().enumerate() {
+        let smoothed = gaussian(&values, [values[0], values[4]], 1.5);
+        for (time, smooth) in smoothed.into_iter().enumerate() {
             assert!(
                 smooth.distance(DVec2::new(expected_x[time], expected_z[time])) < 1e-7,
                 "{time}: {smooth}"

@@ -118,8 +118,9 @@ pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, Feat
     Ok(features)
 }
 
-/// p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame.
-pub(crate) fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
+/// Writes p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame, from the world positions of its 24 joints (cm) and its facing angle
+/// (rad). `frame`: 149 or 154 numbers; panics on fewer than 73.
+pub fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
     let root = positions[0];
     let turn = DQuat::from_rotation_y(-facing);
     for (joint, &position) in positions.iter().enumerate().skip(1) {
