@@ -1,15 +1,12 @@
 //! The baseline "Interpolation": joint rotations slerped between the keyframes, on the given root trajectory.
 
 use glam::{DQuat, DVec3};
-use ndarray::{Array2, s};
+use ndarray::s;
 use rayon::prelude::*;
 
+use super::motion_rows::{rows_from, shorter_turn, write_contacts, write_velocities};
 use super::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
-use crate::motion::contact::FOOT_JOINTS;
-use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
-};
-use crate::motion::placement::world_positions;
+use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION};
 use crate::motion::{Pose, Skeleton};
 
 /// Spherical interpolation between the keyframes (the row "Interpolation" of table 2). Nothing is learned.
@@ -56,10 +53,7 @@ impl Interpolation {
         let facing = request.start.features[FACING.start];
         let turn = shorter_turn(facing, request.target.features[FACING.start]);
 
-        // Row 0 is the keyframe k1 itself: the differences of the first predicted frame start there.
-        let mut rows = Array2::<f64>::zeros((length + 1, FRAME));
-        rows.row_mut(0)
-            .assign(&request.start.features.slice(s![..FRAME]));
+        let mut rows = rows_from(request.start.features.view(), length);
         for step in 1..=length {
             let share = step as f64 / length as f64;
             let body = body_positions(&between(&start, &target, share), &request.skeleton);
@@ -72,30 +66,11 @@ impl Interpolation {
                 .assign(&request.root_trajectory.row(step));
             rows[[step, FACING.start]] = facing + share * turn;
         }
-        self.add_motion(&mut rows);
+        write_velocities(&mut rows);
+        write_contacts(&mut rows, self.contact_threshold);
         Ok(Transition {
             frames: rows.slice(s![1.., ..]).to_owned(),
         })
-    }
-
-    /// Fills velocities and contact labels of all rows but the first from the positions.
-    fn add_motion(&self, rows: &mut Array2<f64>) {
-        for step in 1..rows.nrows() {
-            for (velocities, positions) in [
-                (BODY_VELOCITIES, BODY_POSITIONS),
-                (ROOT_VELOCITY, ROOT_POSITION),
-            ] {
-                for (velocity, position) in velocities.zip(positions) {
-                    rows[[step, velocity]] = rows[[step, position]] - rows[[step - 1, position]];
-                }
-            }
-            let before = world_positions(rows.row(step - 1));
-            let now = world_positions(rows.row(step));
-            for (label, joint) in CONTACTS.zip(FOOT_JOINTS) {
-                let planted = now[joint].distance_squared(before[joint]) < self.contact_threshold;
-                rows[[step, label]] = f64::from(planted);
-            }
-        }
     }
 }
 
@@ -105,12 +80,6 @@ fn facing_pose(keyframe: &KeyframePose) -> Pose {
     let turned = DQuat::from_rotation_y(-keyframe.features[FACING.start]);
     pose.rotations[0] = turned * pose.rotations[0];
     pose
-}
-
-/// Signed angle from `from` to `to` the shorter way round, in [-pi, pi).
-fn shorter_turn(from: f64, to: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    (to - from + PI).rem_euclid(TAU) - PI
 }
 
 /// The pose `share` of the way from `start` to `target`.

@@ -4,13 +4,16 @@
 
 pub mod gradient_check;
 pub mod interpolation;
+pub mod linear_positions;
 pub mod measure;
+mod motion_rows;
 pub mod network;
 pub mod pan2021;
 pub mod registry;
 pub mod trained;
 pub mod transition;
 pub mod weights;
+pub mod zero_velocity;
 
 pub use network::{Batch, Feed, LossTerms, Network};
 pub use registry::ModelConfig;

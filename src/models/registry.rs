@@ -4,7 +4,9 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::interpolation::Interpolation;
+use super::linear_positions::LinearPositions;
 use super::pan2021::{Pan2021, Pan2021Config};
+use super::zero_velocity::ZeroVelocity;
 use super::{ModelError, Network, TransitionModel};
 use crate::autograd::Real;
 use crate::data::{RootFrame, Standardisation};
@@ -18,6 +20,10 @@ pub enum ModelConfig {
     Pan2021(Pan2021Config),
     /// Slerp between the keyframes; nothing to train.
     Interpolation(NoSettings),
+    /// Joint positions on straight lines between the keyframes; nothing to train.
+    LinearPositions(NoSettings),
+    /// The first keyframe's pose held; nothing to train.
+    ZeroVelocity(NoSettings),
 }
 
 /// A table without keys.
@@ -43,10 +49,9 @@ impl ModelConfig {
     ) -> Result<Box<dyn Network<T>>, ModelError> {
         match self {
             Self::Pan2021(config) => Ok(Box::new(Pan2021::new(init, config, standardisation)?)),
-            Self::Interpolation(_) => Err(ModelError::Model {
-                model: "interpolation".into(),
-                reason: "has no weights and needs no training; evaluate its config as it is".into(),
-            }),
+            Self::Interpolation(_) => Err(nothing_to_train("interpolation")),
+            Self::LinearPositions(_) => Err(nothing_to_train("linear_positions")),
+            Self::ZeroVelocity(_) => Err(nothing_to_train("zero_velocity")),
         }
     }
 
@@ -62,7 +67,9 @@ impl ModelConfig {
     pub fn small(&self) -> Self {
         match self {
             Self::Pan2021(config) => Self::Pan2021(config.small()),
-            Self::Interpolation(_) => self.clone(),
+            Self::Interpolation(_) | Self::LinearPositions(_) | Self::ZeroVelocity(_) => {
+                self.clone()
+            }
         }
     }
 
@@ -70,7 +77,16 @@ impl ModelConfig {
     pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn TransitionModel>> {
         match self {
             Self::Interpolation(_) => Some(Box::new(Interpolation { contact_threshold })),
+            Self::LinearPositions(_) => Some(Box::new(LinearPositions { contact_threshold })),
+            Self::ZeroVelocity(_) => Some(Box::new(ZeroVelocity { contact_threshold })),
             Self::Pan2021(_) => None,
         }
+    }
+}
+
+fn nothing_to_train(model: &str) -> ModelError {
+    ModelError::Model {
+        model: model.into(),
+        reason: "has no weights and needs no training; evaluate its config as it is".into(),
     }
 }

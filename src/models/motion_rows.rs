@@ -1,0 +1,50 @@
+//! What follows from the positions of frames in a row: velocities and contact labels.
+
+use ndarray::{Array2, s};
+
+use crate::motion::contact::FOOT_JOINTS;
+use crate::motion::features::{
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FRAME, ROOT_POSITION, ROOT_VELOCITY,
+};
+use crate::motion::placement::world_positions;
+
+/// Writes v^b and v^r of all rows but the first, as the differences of p^b and p^r. `rows`: frames k1, k1 + 1, .., `[N + 1, 149]`, cm.
+pub(super) fn write_velocities(rows: &mut Array2<f64>) {
+    for row in 1..rows.nrows() {
+        for (velocities, positions) in [
+            (BODY_VELOCITIES, BODY_POSITIONS),
+            (ROOT_VELOCITY, ROOT_POSITION),
+        ] {
+            for (velocity, position) in velocities.zip(positions) {
+                rows[[row, velocity]] = rows[[row, position]] - rows[[row - 1, position]];
+            }
+        }
+    }
+}
+
+/// Writes the contact labels of all rows but the first: 1 where the joint's squared speed in the world is below `threshold`,
+/// (cm/frame)^2. `rows`: frames k1, k1 + 1, .., `[N + 1, 149]`.
+pub(super) fn write_contacts(rows: &mut Array2<f64>, threshold: f64) {
+    for row in 1..rows.nrows() {
+        let before = world_positions(rows.row(row - 1));
+        let now = world_positions(rows.row(row));
+        for (label, joint) in CONTACTS.zip(FOOT_JOINTS) {
+            let planted = now[joint].distance_squared(before[joint]) < threshold;
+            rows[[row, label]] = f64::from(planted);
+        }
+    }
+}
+
+/// Rows for keyframe k1 and the N frames after it, `[N + 1, 149]`; k1's numbers, of which `start` has 149 or more, stand in the
+/// first, zeros in the others.
+pub(super) fn rows_from(start: ndarray::ArrayView1<f64>, length: usize) -> Array2<f64> {
+    let mut rows = Array2::zeros((length + 1, FRAME));
+    rows.row_mut(0).assign(&start.slice(s![..FRAME]));
+    rows
+}
+
+/// Signed angle from `from` to `to` the shorter way round, in [-pi, pi).
+pub(super) fn shorter_turn(from: f64, to: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    (to - from + PI).rem_euclid(TAU) - PI
+}
