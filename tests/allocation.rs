@@ -62,10 +62,7 @@ fn large_bytes_by_step(config: &Pan2021Config, feed: Feed) -> Vec<usize> {
     let mut parameters = Parameters::<f32>::new();
     let mut init = Initialiser::new(&mut parameters, ChaCha8Rng::seed_from_u64(1));
     let network = Pan2021::new(&mut init, config, &standardisation).unwrap();
-    let batch = Batch {
-        features: features.mapv(|x| x as f32),
-        total_windows: windows,
-    };
+    let batch = Batch::of(features.mapv(|x| x as f32));
     let mut workspace = Workspace::new();
     let mut gradients = [Gradients::zeros(&parameters)];
     let mut adam = Adam::new(AdamConfig::default(), &parameters);

@@ -111,11 +111,7 @@ fn check(transition: usize, feed: Feed) {
         Feed::Predictions => "own",
     };
     let case = format!("n{transition}_{feed_name}");
-    let features = golden.window(transition);
-    let batch = Batch {
-        total_windows: features.dim().1,
-        features,
-    };
+    let batch = Batch::of(golden.window(transition));
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&parameters);
     let mut tape = Tape::recording(&parameters, &mut workspace);
@@ -161,7 +157,7 @@ fn check(transition: usize, feed: Feed) {
 
     if feed == Feed::Predictions {
         let mut tape = Tape::inference(&parameters, &mut workspace);
-        let predicted = network.predict(&mut tape, &batch.features).unwrap();
+        let predicted = network.predict(&mut tape, &batch).unwrap();
         let recorded = golden.numbers(&format!("{case}.outputs"));
         assert_close(&format!("{case}: outputs"), predicted.iter(), &recorded);
     }

@@ -322,10 +322,7 @@ fn losses(config: &Pan2021Config, feed: Feed) -> BTreeMap<&'static str, f64> {
     let built: Built<f64> = build(config, &standardisation);
     let mut workspace = Workspace::new();
     let mut tape = Tape::recording(&built.parameters, &mut workspace);
-    let batch = Batch {
-        features,
-        total_windows: 2,
-    };
+    let batch = Batch::of(features);
     let losses = built.network.losses(&mut tape, &batch, feed).unwrap();
     let values = losses.terms.into_iter().chain([("total", losses.total)]);
     values
@@ -426,7 +423,8 @@ fn networks() -> [Pan2021Config; 6] {
 fn predict<T: Real>(built: &Built<T>, features: &Array3<T>) -> Array3<T> {
     let mut workspace = Workspace::new();
     let mut tape = Tape::inference(&built.parameters, &mut workspace);
-    built.network.predict(&mut tape, features).unwrap()
+    let batch = Batch::of(features.clone());
+    built.network.predict(&mut tape, &batch).unwrap()
 }
 
 fn largest_difference(a: &Array3<f64>, b: &Array3<f64>) -> f64 {
@@ -516,10 +514,7 @@ fn predictions_are_the_frames_whose_losses_training_takes() {
         let moved = &predicted.slice(s![1.., .., 69..73]) - &predicted.slice(s![..-1, .., 69..73]);
         let first = &predicted.slice(s![0, .., 69..73]) - &features.slice(s![0, .., 69..73]);
         let root = (moved.mapv(|x| x * x).sum() + first.mapv(|x| x * x).sum()) / (12 * 3) as f64;
-        let batch = Batch {
-            features: features.clone(),
-            total_windows: 3,
-        };
+        let batch = Batch::of(features.clone());
         let mut workspace = Workspace::new();
         let mut tape = Tape::recording(&built.parameters, &mut workspace);
         let losses = built
@@ -561,6 +556,7 @@ fn shards_on_tapes_of_their_own_add_up_to_the_batch() {
             .slice(s![.., windows, ..])
             .as_standard_layout()
             .into_owned(),
+        poses: None,
         total_windows: 5,
     };
     for feed in [Feed::GroundTruth, Feed::Predictions] {
@@ -584,7 +580,7 @@ fn features_of_another_shape_are_refused_with_their_shape() {
         let mut tape = Tape::inference(&built.parameters, &mut workspace);
         let error = built
             .network
-            .predict(&mut tape, &Array3::zeros(shape))
+            .predict(&mut tape, &Batch::of(Array3::zeros(shape)))
             .unwrap_err();
         let (frames, windows, numbers) = shape;
         let found = format!("[{frames}, {windows}, {numbers}]");

@@ -68,7 +68,8 @@ const SMALLEST_SCALE: f64 = 1e-3;
 ///
 /// The steps of the difference shrink until it agrees with the gradient; if none does, and a one-sided difference does, then
 /// the number sits at a kink and is counted as such. A gradient that is wrong agrees with neither side, kink or not.
-/// The loss must be deterministic.
+/// `loss` is given the name of the parameter whose gradient is compared: where gradients are stopped, not every parameter's gradient
+/// is that of the same sum. It must be deterministic.
 ///
 /// # Errors
 /// What `loss` returns.
@@ -76,15 +77,15 @@ pub fn check_parameters(
     parameters: &mut Parameters<f64>,
     gradients: &Gradients<f64>,
     per_parameter: usize,
-    mut loss: impl FnMut(&Parameters<f64>) -> Result<f64, AutogradError>,
+    mut loss: impl FnMut(&Parameters<f64>, &str) -> Result<f64, AutogradError>,
 ) -> Result<CheckReport, AutogradError> {
     let names: Vec<String> = parameters.iter().map(|(name, _)| name.to_owned()).collect();
-    let centre = loss(parameters)?;
     let mut reports = Vec::new();
     for (p, (name, gradient)) in names.into_iter().zip(gradients.iter()).enumerate() {
+        let centre = loss(parameters, &name)?;
         let scale = root_mean_square(gradient).max(SMALLEST_SCALE);
         let mut report = ParameterReport {
-            parameter: name,
+            parameter: name.clone(),
             compared: 0,
             kinks: 0,
             worst: None,
@@ -92,7 +93,7 @@ pub fn check_parameters(
         for index in spread(gradient.len(), per_parameter) {
             let mut at = |offset: f64| -> Result<f64, AutogradError> {
                 let before = nudge(parameters, p, index, offset);
-                let value = loss(parameters)?;
+                let value = loss(parameters, &name)?;
                 nudge_to(parameters, p, index, before);
                 Ok(value)
             };

@@ -11,7 +11,7 @@ use safetensors::tensor::{Dtype, TensorView};
 
 use crate::autograd::{Gradients, Tape, Workspace};
 use crate::data::{Dataset, RootFrame, Standardisation, windows};
-use crate::models::{Batch, Feed};
+use crate::models::{Batch, Feed, PoseWindows};
 use crate::training::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
@@ -48,14 +48,10 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let model = run.trained_model(&config)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
     let root_frame = config.model.root_frame();
-    let features = cut(&args, &dataset, model.standardisation(), root_frame)?;
     let (parameters, network) = (model.parameters(), model.network());
+    let batch = cut(&args, &dataset, model.standardisation(), root_frame)?;
     let mut workspace = Workspace::new();
-    let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &features)?;
-    let batch = Batch {
-        total_windows: features.dim().1,
-        features,
-    };
+    let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &batch)?;
     let feed = match args.ground_truth {
         true => Feed::GroundTruth,
         false => Feed::Predictions,
@@ -85,13 +81,13 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Standardised windows `[N + 1, B, 154]`, spread evenly over the training clips.
+/// Windows `[N + 1, B, 154]` with their poses, spread evenly over the training clips.
 fn cut(
     args: &ExportBatchArgs,
     dataset: &Dataset,
     standardisation: &Standardisation,
     root_frame: RootFrame,
-) -> anyhow::Result<Array3<f32>> {
+) -> anyhow::Result<Batch<f32>> {
     let (frames, count) = (usize::from(args.frames), usize::from(args.windows));
     let lengths: Vec<usize> = dataset.train.iter().map(|clip| clip.frames()).collect();
     let all = windows(&lengths, frames).windows;
@@ -104,13 +100,18 @@ fn cut(
     }
     let shape = (frames + 1, count, crate::motion::features::FEATURES);
     let mut features = Array3::zeros(shape);
+    let mut poses = PoseWindows::zeros(frames + 1, count);
     for (k, mut target) in features.axis_iter_mut(Axis(1)).enumerate() {
         let window = all[k * all.len() / count];
-        let clip = &dataset.train[window.clip].features;
-        let cut = root_frame.window_features(clip, window.start, frames);
+        let clip = &dataset.train[window.clip];
+        let cut = root_frame.window_features(&clip.features, window.start, frames);
         target.assign(&standardisation.standardise(cut.view()).mapv(|x| x as f32));
+        poses.write(k, 0..=frames, &clip.clip.poses[window.start..]);
     }
-    Ok(features)
+    Ok(Batch {
+        poses: Some(poses),
+        ..Batch::of(features)
+    })
 }
 
 fn serialise(entries: &BTreeMap<String, Entry>) -> anyhow::Result<Vec<u8>> {

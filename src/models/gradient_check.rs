@@ -5,7 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use super::{Batch, Feed, ModelConfig, ModelError};
+use super::network::CRITICS;
+use super::{Batch, Feed, ModelConfig, ModelError, PoseWindows};
 use crate::autograd::check::{CheckReport, check_parameters};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
@@ -56,16 +57,15 @@ pub enum GradientCheckError {
     Autograd(#[from] AutogradError),
 }
 
-/// Windows of generated dance, standardised `[transition + 1, windows, 154]`, each from a clip of its own, and the statistics of
-/// those clips.
+/// Windows of generated dance, each from a clip of its own, with their poses, and the statistics of those clips.
 ///
 /// # Errors
 /// No frames or no windows; more frames than can be generated.
-pub fn generated_windows(
+pub fn generated_batch(
     transition: usize,
     windows: usize,
     seed: u64,
-) -> Result<(Array3<f64>, Standardisation), GradientCheckError> {
+) -> Result<(Batch<f64>, Standardisation), GradientCheckError> {
     if transition == 0 || windows == 0 {
         return Err(GradientCheckError::Empty);
     }
@@ -80,15 +80,36 @@ pub fn generated_windows(
         .collect::<Result<Vec<_>, _>>()?;
     let standardisation = Standardisation::fit(clips.iter().map(|clip| clip.features.view()));
     let mut features = Array3::zeros((transition + 1, windows, FEATURES));
+    let mut poses = PoseWindows::zeros(transition + 1, windows);
+    let start = SPARE_FRAMES / 2;
     for (window, clip) in clips.iter().enumerate() {
-        let cut = window_features(&clip.features, SPARE_FRAMES / 2, transition);
+        let cut = window_features(&clip.features, start, transition);
         let cut = standardisation.standardise(cut.view());
         features.index_axis_mut(Axis(1), window).assign(&cut);
+        poses.write(window, 0..=transition, &clip.clip.poses[start..]);
     }
-    Ok((features, standardisation))
+    let batch = Batch {
+        poses: Some(poses),
+        ..Batch::of(features)
+    };
+    Ok((batch, standardisation))
 }
 
-/// Compares the gradient of a model's total loss with central differences.
+/// The features alone of [`generated_batch`], standardised `[transition + 1, windows, 154]`.
+///
+/// # Errors
+/// As [`generated_batch`].
+pub fn generated_windows(
+    transition: usize,
+    windows: usize,
+    seed: u64,
+) -> Result<(Array3<f64>, Standardisation), GradientCheckError> {
+    let (batch, standardisation) = generated_batch(transition, windows, seed)?;
+    Ok((batch.features, standardisation))
+}
+
+/// Compares the gradient of a model's total loss with central differences: for critics of their own part of it, for all other
+/// weights of the rest (see [`super::LossTerms::critics`]).
 ///
 /// # Errors
 /// A model that is not trained, or whose settings do not fit together; nothing to check it on.
@@ -97,12 +118,7 @@ pub fn check_model(
     case: GradientCase,
     config: GradientCheckConfig,
 ) -> Result<CheckReport, GradientCheckError> {
-    let (features, standardisation) =
-        generated_windows(case.transition, config.windows, config.seed)?;
-    let batch = Batch {
-        features,
-        total_windows: config.windows,
-    };
+    let (batch, standardisation) = generated_batch(case.transition, config.windows, config.seed)?;
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
     let mut parameters = Parameters::<f64>::new();
     let network = model.build(
@@ -124,11 +140,18 @@ pub fn check_model(
         &mut parameters,
         &gradients,
         config.per_parameter,
-        |parameters| {
+        |parameters, name| {
             let mut tape = Tape::inference(parameters, &mut workspace);
             tape.set_dropout(key);
-            let total = network.losses(&mut tape, &batch, case.feed)?.total;
-            Ok(tape.values(total)[0])
+            let losses = network.losses(&mut tape, &batch, case.feed)?;
+            let total = tape.values(losses.total)[0];
+            let critics = losses
+                .critics
+                .map_or(0.0, |critics| tape.values(critics)[0]);
+            Ok(match name.starts_with(CRITICS) {
+                true => critics,
+                false => total - critics,
+            })
         },
     )?;
     Ok(report)

@@ -6,7 +6,7 @@ use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-use super::{ModelConfig, ModelError, Network};
+use super::{Batch, ModelConfig, ModelError, Network, PoseWindows};
 use crate::autograd::{Parameters, Tape, Workspace};
 use crate::data::Standardisation;
 use crate::motion::features::FEATURES;
@@ -17,7 +17,7 @@ pub struct MeasuredGeneration {
     network: Box<dyn Network<f32>>,
     parameters: Parameters<f32>,
     pool: rayon::ThreadPool,
-    parts: Vec<(Array3<f32>, Workspace<f32>)>,
+    parts: Vec<(Batch<f32>, Workspace<f32>)>,
 }
 
 impl MeasuredGeneration {
@@ -54,7 +54,17 @@ impl MeasuredGeneration {
                 let windows = (k + 1) * batch / count - k * batch / count;
                 let shape = (frames + 1, windows, FEATURES);
                 let features = Array3::from_shape_simple_fn(shape, || rng.random_range(-1.0..1.0));
-                (features, Workspace::new())
+                let poses = network.reads_poses().then(|| {
+                    let mut poses = PoseWindows::zeros(frames + 1, windows);
+                    let made_up = |_: f32| rng.random_range(-1.0..1.0);
+                    poses.rotations.mapv_inplace(made_up);
+                    poses
+                });
+                let batch = Batch {
+                    poses,
+                    ..Batch::of(features)
+                };
+                (batch, Workspace::new())
             })
             .collect();
         Ok(Self {
@@ -75,9 +85,9 @@ impl MeasuredGeneration {
         let start = Instant::now();
         self.pool
             .install(|| {
-                parts.par_iter_mut().try_for_each(|(features, workspace)| {
+                parts.par_iter_mut().try_for_each(|(batch, workspace)| {
                     let mut tape = Tape::inference(parameters, workspace);
-                    network.predict(&mut tape, features).map(|_| ())
+                    network.predict(&mut tape, batch).map(|_| ())
                 })
             })
             .map_err(|cause| ModelError::Model {

@@ -9,6 +9,7 @@ pub mod measure;
 mod motion_rows;
 pub mod network;
 pub mod pan2021;
+pub mod pose_windows;
 pub mod registry;
 pub mod trained;
 pub mod transition;
@@ -16,6 +17,7 @@ pub mod weights;
 pub mod zero_velocity;
 
 pub use network::{Batch, Feed, LossTerms, Network};
+pub use pose_windows::PoseWindows;
 pub use registry::ModelConfig;
 pub use trained::TrainedModel;
 pub use transition::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};

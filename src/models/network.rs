@@ -2,15 +2,32 @@
 
 use ndarray::Array3;
 
+use super::pose_windows::PoseWindows;
 use crate::autograd::{AutogradError, Real, Tape, Var};
+
+/// What the names of weights begin with that judge the others' output, see [`LossTerms::critics`].
+pub const CRITICS: &str = "critics.";
 
 /// Windows of one length, or a shard of them, as the network reads them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch<T> {
     /// Standardised features, `[N + 1, windows, 154]`; row 0 is keyframe k1, row N keyframe k2.
     pub features: Array3<T>,
+    /// The same windows as joint rotations, for a network that [reads](Network::reads_poses) them.
+    pub poses: Option<PoseWindows<T>>,
     /// Windows of the whole batch that this is a shard of: losses are means over these.
     pub total_windows: usize,
+}
+
+impl<T: Real> Batch<T> {
+    /// A whole batch of features alone.
+    pub fn of(features: Array3<T>) -> Self {
+        Self {
+            total_windows: features.dim().1,
+            features,
+            poses: None,
+        }
+    }
 }
 
 /// What is fed to the network as the current frame.
@@ -25,14 +42,27 @@ pub enum Feed {
 /// Loss terms of a batch, each `[1]`.
 #[derive(Debug, Clone)]
 pub struct LossTerms {
-    /// The weighted sum that is minimised.
+    /// The weighted sum that is run backwards.
     pub total: Var,
+    /// The part of `total` that the weights named [`CRITICS`].. minimise, in an adversarial training. Their gradients come from it
+    /// alone, and the gradients of all other weights from the rest of `total` alone: each side is a constant in the other's part.
+    pub critics: Option<Var>,
     /// Terms by name, not weighted, in a fixed order.
     pub terms: Vec<(&'static str, Var)>,
 }
 
 /// A trainable network; its weights live in the [`crate::autograd::Parameters`] that it was built with.
 pub trait Network<T: Real>: Send + Sync {
+    /// Whether its batches need [`Batch::poses`].
+    fn reads_poses(&self) -> bool {
+        false
+    }
+
+    /// What it is fed at a step for which scheduled sampling drew `drawn`.
+    fn feed(&self, drawn: Feed) -> Feed {
+        drawn
+    }
+
     /// Loss terms of a batch, divided by its `total_windows`, so that the terms of the shards add up to the batch's.
     ///
     /// # Errors
@@ -49,9 +79,6 @@ pub trait Network<T: Real>: Send + Sync {
     ///
     /// # Errors
     /// Features that do not fit the network.
-    fn predict(
-        &self,
-        tape: &mut Tape<'_, T>,
-        features: &Array3<T>,
-    ) -> Result<Array3<T>, AutogradError>;
+    fn predict(&self, tape: &mut Tape<'_, T>, batch: &Batch<T>)
+    -> Result<Array3<T>, AutogradError>;
 }

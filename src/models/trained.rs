@@ -4,7 +4,9 @@ use std::sync::{Arc, Mutex};
 
 use ndarray::{Array2, Array3, s};
 
-use super::{ModelError, Network, Transition, TransitionModel, TransitionRequest};
+use super::{
+    Batch, ModelError, Network, PoseWindows, Transition, TransitionModel, TransitionRequest,
+};
 use crate::autograd::{Parameters, Tape, Workspace};
 use crate::data::window::wrap;
 use crate::data::{RootFrame, Standardisation};
@@ -57,8 +59,9 @@ impl TrainedModel {
         self.root_frame.origin(first)
     }
 
-    /// The network's inputs for requests of one length, `[N + 1, windows, 154]`, standardised; what is not given is 0.
-    fn inputs(&self, requests: &[&TransitionRequest], length: usize) -> Array3<f32> {
+    /// The network's inputs for requests of one length: features `[N + 1, windows, 154]`, standardised, and the keyframes' poses where
+    /// the network reads them; what is not given is 0.
+    fn inputs(&self, requests: &[&TransitionRequest], length: usize) -> Batch<f32> {
         let mut features = Array3::zeros((length + 1, requests.len(), FEATURES));
         let standardise = |value: f64, number: usize| {
             ((value - self.standardisation.mean[number]) / self.standardisation.std[number]) as f32
@@ -86,7 +89,18 @@ impl TrainedModel {
                 }
             }
         }
-        features
+        let poses = self.network.reads_poses().then(|| {
+            let mut poses = PoseWindows::zeros(length + 1, requests.len());
+            for (window, request) in requests.iter().enumerate() {
+                let keyframes = [&request.start.pose, &request.target.pose];
+                poses.write(window, [0, length], keyframes);
+            }
+            poses
+        });
+        Batch {
+            poses,
+            ..Batch::of(features)
+        }
     }
 
     fn predict(

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use glam::{DQuat, DVec3};
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
@@ -9,12 +10,13 @@ use serde::Serialize;
 use super::config::ExperimentConfig;
 use super::error::TrainingError;
 use super::schedule::BatchPlan;
-use super::step::{StepInput, Stepper, TrainingWindows};
+use super::step::{StepInput, Stepper, TrainingClip, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{RootFrame, Standardisation, Window};
 use crate::models::{Feed, Network};
 use crate::motion::features::FEATURES;
+use crate::motion::{JOINTS, Pose};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
 
@@ -25,6 +27,7 @@ pub struct MeasuredStep {
     parameters: Parameters<f32>,
     standardisation: Standardisation,
     clip: Array2<f64>,
+    poses: Vec<Pose>,
     adam: Adam<f32>,
     stepper: Stepper,
     plan: BatchPlan,
@@ -48,6 +51,13 @@ impl MeasuredStep {
         let clip = Array2::from_shape_simple_fn((frames + batch, FEATURES), || {
             rng.random_range(-1.0..1.0)
         });
+        let poses = std::iter::repeat_with(|| Pose {
+            translations: vec![DVec3::Y; JOINTS],
+            rotations: (0..JOINTS)
+                .map(|_| DQuat::from_rotation_x(rng.random_range(-1.0..1.0)))
+                .collect(),
+        });
+        let poses = poses.take(clip.nrows()).collect();
         let standardisation = Standardisation::fit([clip.view()]);
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
@@ -60,6 +70,7 @@ impl MeasuredStep {
             parameters,
             standardisation,
             clip,
+            poses,
             plan: BatchPlan {
                 length: frames,
                 windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
@@ -75,7 +86,10 @@ impl MeasuredStep {
     /// A loss or gradient that is not finite.
     pub fn run(&mut self) -> Result<Duration, TrainingError> {
         let windows = TrainingWindows {
-            clips: vec![&self.clip],
+            clips: vec![TrainingClip {
+                features: &self.clip,
+                poses: &self.poses,
+            }],
             standardisation: self.standardisation.clone(),
             root_frame: RootFrame::World,
         };

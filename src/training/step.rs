@@ -13,7 +13,8 @@ use super::streams::Streams;
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::{RootFrame, Standardisation, Window};
 use crate::evaluation::Evaluation;
-use crate::models::{Batch, Feed, Network};
+use crate::models::{Batch, Feed, Network, PoseWindows};
+use crate::motion::Pose;
 use crate::motion::features::FEATURES;
 use crate::optim::Adam;
 
@@ -66,18 +67,25 @@ fn by_name<S: Serializer>(
 
 /// The training clips, and how their windows become network input.
 pub(super) struct TrainingWindows<'d> {
-    /// `[frames, 154]` each, not standardised.
-    pub clips: Vec<&'d Array2<f64>>,
+    pub clips: Vec<TrainingClip<'d>>,
     pub standardisation: Standardisation,
     pub root_frame: RootFrame,
 }
 
+/// One of them.
+#[derive(Clone, Copy)]
+pub(super) struct TrainingClip<'d> {
+    /// `[frames, 154]`, not standardised.
+    pub features: &'d Array2<f64>,
+    pub poses: &'d [Pose],
+}
+
 impl TrainingWindows<'_> {
     /// Standardised features of windows of `length` + 1 frames, `[length + 1, windows, 154]`.
-    fn cut(&self, windows: &[Window], length: usize) -> Array3<f32> {
+    fn features(&self, windows: &[Window], length: usize) -> Array3<f32> {
         let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
         for (k, window) in windows.iter().enumerate() {
-            let clip = self.clips[window.clip];
+            let clip = self.clips[window.clip].features;
             let cut = self.root_frame.window_features(clip, window.start, length);
             features.index_axis_mut(Axis(1), k).assign(
                 &self
@@ -87,6 +95,16 @@ impl TrainingWindows<'_> {
             );
         }
         features
+    }
+
+    /// Poses of the same windows; none where a clip has none of its own.
+    fn poses(&self, windows: &[Window], length: usize) -> Option<PoseWindows<f32>> {
+        let mut cut = PoseWindows::zeros(length + 1, windows.len());
+        for (k, window) in windows.iter().enumerate() {
+            let frames = window.start..=window.start + length;
+            cut.write(k, 0..=length, self.clips[window.clip].poses.get(frames)?);
+        }
+        Some(cut)
     }
 }
 
@@ -262,7 +280,11 @@ fn run_shard(
     trace: bool,
 ) -> Result<Losses, AutogradError> {
     let batch = Batch {
-        features: input.windows.cut(windows, input.plan.length),
+        features: input.windows.features(windows, input.plan.length),
+        poses: match input.network.reads_poses() {
+            true => input.windows.poses(windows, input.plan.length),
+            false => None,
+        },
         total_windows: input.plan.windows.len(),
     };
     let mut tape = Tape::recording(parameters, workspace)

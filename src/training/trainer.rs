@@ -16,7 +16,7 @@ use super::manifest::{self, Manifest, RunState};
 use super::run_folder::RunFolder;
 use super::schedule::{BatchPlan, Schedule};
 use super::state::{self, Header};
-use super::step::{StepInput, StepReport, Stepper, TrainingWindows};
+use super::step::{StepInput, StepReport, Stepper, TrainingClip, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{DanceClip, Dataset, Standardisation};
@@ -97,7 +97,10 @@ impl<'d> Trainer<'d> {
             cause,
         })?;
         let config_toml = config.to_toml()?;
-        let clips: Vec<_> = dataset.train.iter().map(|clip| &clip.features).collect();
+        let clips = dataset.train.iter().map(|clip| TrainingClip {
+            features: &clip.features,
+            poses: &clip.clip.poses,
+        });
         let streams = Streams::new(config.seed);
         let frames: Vec<usize> = dataset.train.iter().map(DanceClip::frames).collect();
         let schedule = Schedule::new(&frames, &config.schedule, streams);
@@ -114,7 +117,7 @@ impl<'d> Trainer<'d> {
         // Of the longest transitions that are trained.
         let longest = frames.iter().map(|frames| frames.saturating_sub(1)).max();
         let transition = config.schedule.max_len.min(longest.unwrap_or(0));
-        let views = clips.iter().map(|clip| clip.view());
+        let views = dataset.train.iter().map(|clip| clip.features.view());
         let standardisation = root_frame.standardisation(views, transition);
         if config.validation.is_some() && dataset.validation.is_empty() {
             return Err(TrainingError::NoValidationClips);
@@ -126,7 +129,7 @@ impl<'d> Trainer<'d> {
             config_digest: checkpoint::file_digest(config_toml.as_bytes()),
             config_toml,
             windows: TrainingWindows {
-                clips,
+                clips: clips.collect(),
                 standardisation,
                 root_frame,
             },
@@ -342,11 +345,12 @@ impl<'d> Trainer<'d> {
         let beta = self
             .schedule
             .teacher_forcing(&self.config.scheduled_sampling, step);
-        let feed = if self.streams.sampling(step).random::<f64>() < beta {
+        let drawn = if self.streams.sampling(step).random::<f64>() < beta {
             Feed::GroundTruth
         } else {
             Feed::Predictions
         };
+        let feed = self.network.feed(drawn);
         let input = StepInput {
             network: self.network.as_ref(),
             windows: &self.windows,

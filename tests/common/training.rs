@@ -79,6 +79,7 @@ impl<T: Real> Network<T> for Recurrence {
         let total = tape.affine(sum, 1.0 / count as f64, 0.0);
         Ok(LossTerms {
             total,
+            critics: None,
             terms: vec![("reconstruction", total)],
         })
     }
@@ -86,9 +87,9 @@ impl<T: Real> Network<T> for Recurrence {
     fn predict(
         &self,
         _tape: &mut Tape<'_, T>,
-        features: &Array3<T>,
+        batch: &Batch<T>,
     ) -> Result<Array3<T>, AutogradError> {
-        Ok(features.slice(s![1.., .., ..FRAME]).to_owned())
+        Ok(batch.features.slice(s![1.., .., ..FRAME]).to_owned())
     }
 }
 

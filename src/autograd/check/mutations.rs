@@ -135,7 +135,7 @@ fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport
     let mut tape = Tape::recording(&parameters, &mut workspace);
     let total = loss(&mut tape);
     tape.backward(total, &mut gradients).unwrap();
-    check_parameters(&mut parameters, &gradients, 100, |parameters| {
+    check_parameters(&mut parameters, &gradients, 100, |parameters, _| {
         let mut tape = Tape::inference(parameters, &mut workspace);
         let total = loss(&mut tape);
         Ok(tape.values(total)[0])
@@ -186,7 +186,7 @@ fn at_a_kink(x: f64, claimed: f64) -> Result<CheckReport, AutogradError> {
     gradients
         .iter_mut()
         .for_each(|gradient| gradient[0] = claimed);
-    check_parameters(&mut parameters, &gradients, 1, |parameters| {
+    check_parameters(&mut parameters, &gradients, 1, |parameters, _| {
         Ok(parameters.iter().map(|(_, x)| x[[0]].abs()).sum())
     })
 }

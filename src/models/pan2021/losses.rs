@@ -81,6 +81,7 @@ pub(super) fn terms<T: Real>(
     }
     Ok(LossTerms {
         total,
+        critics: None,
         terms: all
             .into_iter()
             .map(|(name, _, term)| (name, term))

@@ -403,9 +403,9 @@ impl<T: Real> Network<T> for Pan2021 {
     fn predict(
         &self,
         tape: &mut Tape<'_, T>,
-        features: &Array3<T>,
+        batch: &Batch<T>,
     ) -> Result<Array3<T>, AutogradError> {
-        let mut rollout = self.start(tape, features)?;
+        let mut rollout = self.start(tape, &batch.features)?;
         let (transition, windows) = (rollout.transition, rollout.windows);
         let mut predicted = Vec::with_capacity(transition * windows * FRAME);
         rollout.feed_truth(tape, 0);
@@ -419,7 +419,7 @@ impl<T: Real> Network<T> for Pan2021 {
         Array3::from_shape_vec((transition, windows, FRAME), predicted).map_err(|_| {
             AutogradError::Argument {
                 operation: "pan2021",
-                shape: features.shape().to_vec(),
+                shape: batch.features.shape().to_vec(),
                 argument: "the predicted frames".into(),
                 expected: "149 numbers a frame",
             }
