@@ -3,6 +3,7 @@
 //! Evaluation and synthesis know a model by this trait only, training by [`Network`].
 
 pub mod gradient_check;
+pub mod harvey2020;
 pub mod interpolation;
 pub mod linear_positions;
 pub mod measure;
@@ -10,6 +11,7 @@ mod motion_rows;
 pub mod network;
 pub mod pan2021;
 pub mod pose_windows;
+mod posed_frames;
 pub mod registry;
 pub mod trained;
 pub mod transition;

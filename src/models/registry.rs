@@ -3,6 +3,7 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+use super::harvey2020::{Harvey2020, Harvey2020Config};
 use super::interpolation::Interpolation;
 use super::linear_positions::LinearPositions;
 use super::pan2021::{Pan2021, Pan2021Config};
@@ -18,6 +19,8 @@ use crate::nn::Initialiser;
 pub enum ModelConfig {
     /// Pan et al. 2021, and its ablations.
     Pan2021(Pan2021Config),
+    /// Harvey et al. 2020, with or without its critics.
+    Harvey2020(Harvey2020Config),
     /// Slerp between the keyframes; nothing to train.
     Interpolation(NoSettings),
     /// Joint positions on straight lines between the keyframes; nothing to train.
@@ -49,6 +52,9 @@ impl ModelConfig {
     ) -> Result<Box<dyn Network<T>>, ModelError> {
         match self {
             Self::Pan2021(config) => Ok(Box::new(Pan2021::new(init, config, standardisation)?)),
+            Self::Harvey2020(config) => {
+                Ok(Box::new(Harvey2020::new(init, config, standardisation)?))
+            }
             Self::Interpolation(_) => Err(nothing_to_train("interpolation")),
             Self::LinearPositions(_) => Err(nothing_to_train("linear_positions")),
             Self::ZeroVelocity(_) => Err(nothing_to_train("zero_velocity")),
@@ -67,6 +73,7 @@ impl ModelConfig {
     pub fn small(&self) -> Self {
         match self {
             Self::Pan2021(config) => Self::Pan2021(config.small()),
+            Self::Harvey2020(config) => Self::Harvey2020(config.small()),
             Self::Interpolation(_) | Self::LinearPositions(_) | Self::ZeroVelocity(_) => {
                 self.clone()
             }
@@ -79,7 +86,7 @@ impl ModelConfig {
             Self::Interpolation(_) => Some(Box::new(Interpolation { contact_threshold })),
             Self::LinearPositions(_) => Some(Box::new(LinearPositions { contact_threshold })),
             Self::ZeroVelocity(_) => Some(Box::new(ZeroVelocity { contact_threshold })),
-            Self::Pan2021(_) => None,
+            Self::Pan2021(_) | Self::Harvey2020(_) => None,
         }
     }
 }

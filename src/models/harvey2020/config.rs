@@ -1,0 +1,151 @@
+//! Sizes of the network, its noise and its losses.
+
+use serde::{Deserialize, Serialize};
+
+use crate::models::ModelError;
+
+/// Weights of the loss terms.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HarveyLossWeights {
+    pub quaternion: f64,
+    pub root: f64,
+    pub position: f64,
+    pub contact: f64,
+    /// Of the critics' judgement in the generator's loss; the critics' own loss has weight 1.
+    pub adversarial: f64,
+}
+
+impl Default for HarveyLossWeights {
+    fn default() -> Self {
+        Self {
+            quaternion: 1.0,
+            root: 1.0,
+            position: 0.5,
+            contact: 0.1,
+            adversarial: 0.1,
+        }
+    }
+}
+
+/// The network of Harvey et al. 2020; the defaults are that paper's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Harvey2020Config {
+    /// Whether the two critics are trained with the network.
+    pub adversarial: bool,
+    /// First hidden layer of encoders, decoder and critics.
+    pub hidden: usize,
+    /// Codes, second hidden layer of decoder and critics, time-to-arrival embedding; even.
+    pub code: usize,
+    /// Units of the LSTM.
+    pub recurrent: usize,
+    /// Time to arrival from which on its embedding stays the same, frames.
+    pub arrival_frames: usize,
+    /// Standard deviation of the target noise in training; 0 for none.
+    pub target_noise: f64,
+    /// Frames before the target up to which there is no target noise.
+    pub noise_from: usize,
+    /// Frames before the target from which on the target noise is whole.
+    pub noise_whole: usize,
+    /// Standard deviation of the Gaussian that smooths the facing direction of predicted frames, frames: as `data.facing_sigma`.
+    pub facing_sigma: f64,
+    pub loss: HarveyLossWeights,
+}
+
+impl Default for Harvey2020Config {
+    fn default() -> Self {
+        Self {
+            adversarial: true,
+            hidden: 512,
+            code: 256,
+            recurrent: 1024,
+            arrival_frames: 66,
+            target_noise: 0.5,
+            noise_from: 5,
+            noise_whole: 30,
+            facing_sigma: 20.0,
+            loss: HarveyLossWeights::default(),
+        }
+    }
+}
+
+impl Harvey2020Config {
+    /// The same structure in small sizes (8 units a layer), for checks in f64.
+    pub fn small(&self) -> Self {
+        Self {
+            hidden: 8,
+            code: 8,
+            recurrent: 8,
+            ..self.clone()
+        }
+    }
+
+    /// Share of the target noise `arrival` frames before the target: 0 up to `noise_from`, 1 from `noise_whole` on.
+    pub(super) fn noise_share(&self, arrival: usize) -> f64 {
+        let span = (self.noise_whole - self.noise_from) as f64;
+        ((arrival as f64 - self.noise_from as f64) / span).clamp(0.0, 1.0)
+    }
+
+    /// Checks the fields against each other.
+    ///
+    /// # Errors
+    /// [`ModelError::Model`] that names the field and what it must be.
+    pub fn check(&self) -> Result<(), ModelError> {
+        let complain = |reason: String| {
+            Err(ModelError::Model {
+                model: "harvey2020".into(),
+                reason,
+            })
+        };
+        for (key, value) in [
+            ("hidden", self.hidden),
+            ("code", self.code),
+            ("recurrent", self.recurrent),
+            ("arrival_frames", self.arrival_frames),
+            ("noise_whole", self.noise_whole),
+        ] {
+            if !(1..=65_536).contains(&value) {
+                return complain(format!("model.{key} = {value}: expected 1 to 65536"));
+            }
+        }
+        if !self.code.is_multiple_of(2) {
+            return complain(format!(
+                "model.code = {}: expected an even number",
+                self.code
+            ));
+        }
+        if self.noise_from >= self.noise_whole {
+            return complain(format!(
+                "model.noise_from = {}: expected less than model.noise_whole = {}",
+                self.noise_from, self.noise_whole
+            ));
+        }
+        if !(self.facing_sigma > 0.0 && self.facing_sigma <= 10_000.0) {
+            return complain(format!(
+                "model.facing_sigma = {}: expected a number of frames above 0 and at most 10000",
+                self.facing_sigma
+            ));
+        }
+        let HarveyLossWeights {
+            quaternion,
+            root,
+            position,
+            contact,
+            adversarial,
+        } = self.loss;
+        for (key, value) in [
+            ("target_noise", self.target_noise),
+            ("loss.quaternion", quaternion),
+            ("loss.root", root),
+            ("loss.position", position),
+            ("loss.contact", contact),
+            ("loss.adversarial", adversarial),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return complain(format!("model.{key} = {value}: expected 0 or more"));
+            }
+        }
+        Ok(())
+    }
+}
