@@ -28,7 +28,7 @@ pub enum Measured {
 
 enum Layers {
     Lstm { lstm: Lstm, head: Linear },
-    Encoder([TransformerEncoderLayer; 2]),
+    Encoder(Box<[TransformerEncoderLayer; 2]>),
 }
 
 /// A share of the batch, for one thread.
@@ -73,7 +73,9 @@ impl MeasuredLayers {
                 };
                 let layers =
                     ["0", "1"].map(|name| TransformerEncoderLayer::new(&mut init, name, sizes));
-                (Layers::Encoder(layers), |count| [count * TOKENS, 256])
+                (Layers::Encoder(Box::new(layers)), |count| {
+                    [count * TOKENS, 256]
+                })
             }
         };
         let count = threads.clamp(1, BATCH);
@@ -150,7 +152,7 @@ impl Layers {
             }
             Self::Encoder(layers) => {
                 let mut x = tape.input(input.clone());
-                for layer in layers {
+                for layer in layers.iter() {
                     x = layer.forward(tape, x, TOKENS)?;
                 }
                 Ok(x)
