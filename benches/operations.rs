@@ -1,5 +1,5 @@
 //! Each operation's forward pass at the model's shapes (32 windows of 7 tokens, width 256) against the loops that one would write
-//! first, with the standard library's functions.
+//! first, with the standard library's functions. Dropout and noise are random and not compared; dropout is timed with the products.
 
 use std::hint::black_box;
 
@@ -17,6 +17,10 @@ const ROWS: usize = WINDOWS * TOKENS;
 const D: usize = 256;
 const HEADS: usize = 8;
 const DH: usize = D / HEADS;
+/// Numbers of a token of the velocity factor controller: five factors and a position of seven.
+const NUMBERS: usize = 12;
+/// Joints of a chain.
+const CHAIN: usize = 24;
 
 fn random(shape: &[usize]) -> ArrayD<f32> {
     let mut state = shape.iter().sum::<usize>() as u32 + 1;
@@ -112,6 +116,43 @@ fn attend(q: &[f32], keys: &[&[f32]], values: &[&[f32]]) -> Vec<f32> {
     y
 }
 
+/// The tokens of a window, weighted by their softmaxed products with a query.
+fn weighted_tokens(q: &[f32], tokens: &[f32]) -> Vec<f32> {
+    let mut weights: Vec<f32> = tokens
+        .chunks_exact(NUMBERS)
+        .map(|token| 0.5 * q.iter().zip(token).map(|(q, x)| q * x).sum::<f32>())
+        .collect();
+    softmax(&mut weights);
+    let mut sum = vec![0.0; NUMBERS];
+    for (weight, token) in weights.iter().zip(tokens.chunks_exact(NUMBERS)) {
+        sum.iter_mut()
+            .zip(token)
+            .for_each(|(s, x)| *s += weight * x);
+    }
+    sum
+}
+
+/// Positions of a chain of joints, each turned by its quaternion (x, y, z, w) in its parent's frame.
+fn chain(rotations: &[f32], offsets: &[f32]) -> Vec<f32> {
+    let mut whole = glam::Quat::IDENTITY;
+    let mut position = glam::Vec3::ZERO;
+    rotations
+        .chunks_exact(4)
+        .zip(offsets.chunks_exact(3))
+        .flat_map(|(q, o)| {
+            position += rotated(whole, glam::Vec3::from_slice(o));
+            whole *= glam::Quat::from_slice(q);
+            position.to_array()
+        })
+        .collect()
+}
+
+/// v + 2 w (u x v) + 2 u x (u x v), whatever the quaternion's length.
+fn rotated(q: glam::Quat, v: glam::Vec3) -> glam::Vec3 {
+    let (u, w) = (q.xyz(), q.w);
+    v + 2.0 * w * u.cross(v) + 2.0 * u.cross(u.cross(v))
+}
+
 fn layer_norm(z: &[f32], gamma: &[f32], beta: &[f32]) -> Vec<f32> {
     z.chunks_exact(D)
         .flat_map(|z| {
@@ -185,6 +226,23 @@ fn layers(c: &mut Criterion) {
                     tokens
                         .iter()
                         .flat_map(|q| attend(&q[..D], &keys, &values))
+                        .collect::<Vec<_>>()
+                })
+                .collect()
+        },
+    );
+    compare(
+        group,
+        "shared_attention",
+        &[&[ROWS, HEADS * NUMBERS], &[ROWS, NUMBERS]],
+        |tape, v| tape.shared_attention(v[0], v[1], TOKENS, 0.5, 0.0),
+        |x| {
+            x[0].chunks_exact(TOKENS * HEADS * NUMBERS)
+                .zip(x[1].chunks_exact(TOKENS * NUMBERS))
+                .flat_map(|(queries, tokens)| {
+                    queries
+                        .chunks_exact(NUMBERS)
+                        .flat_map(|q| weighted_tokens(q, tokens))
                         .collect::<Vec<_>>()
                 })
                 .collect()
@@ -321,6 +379,61 @@ fn elementwise(c: &mut Criterion) {
             Ok(tape.sqrt(squares))
         },
         |x| map(x[0], |x| (x * x).sqrt()),
+    );
+    compare(
+        group,
+        "abs",
+        one,
+        |tape, v| Ok(tape.abs(v[0])),
+        |x| map(x[0], f32::abs),
+    );
+    compare(
+        group,
+        "plu",
+        one,
+        |tape, v| Ok(tape.plu(v[0])),
+        |x| {
+            map(x[0], |x| {
+                (0.1 * (x + 1.0) - 1.0).max((0.1 * (x - 1.0) + 1.0).min(x))
+            })
+        },
+    );
+    compare(
+        group,
+        "normalise",
+        one,
+        |tape, v| tape.normalise(v[0], 4, 1e-8),
+        |x| {
+            x[0].chunks_exact(4)
+                .flat_map(|x| {
+                    let length = (x.iter().map(|x| x * x).sum::<f32>() + 1e-8).sqrt();
+                    x.iter().map(|x| x / length).collect::<Vec<_>>()
+                })
+                .collect()
+        },
+    );
+    compare(
+        group,
+        "forward_kinematics",
+        &[&[ROWS, 4 * CHAIN], &[1, 3 * CHAIN]],
+        |tape, v| {
+            let parents: Vec<_> = (0..CHAIN)
+                .map(|joint: usize| joint.checked_sub(1))
+                .collect();
+            let unit = tape.normalise(v[0], 4, 1e-8)?;
+            tape.forward_kinematics(unit, v[1], &parents)
+        },
+        |x| {
+            x[0].chunks_exact(4 * CHAIN)
+                .flat_map(|rotations| {
+                    let unit: Vec<f32> = rotations
+                        .chunks_exact(4)
+                        .flat_map(|q| glam::Quat::from_slice(q).normalize().to_array())
+                        .collect();
+                    chain(&unit, x[1])
+                })
+                .collect()
+        },
     );
     compare(
         group,
