@@ -44,20 +44,22 @@ impl ModelConfig {
     /// The network to train, its weights added through `init`.
     ///
     /// # Errors
-    /// A model that is not trained; settings that do not fit together.
+    /// A model that is not trained; settings that do not fit together; more weights than `init` allows.
     pub fn build<T: Real, R: Rng>(
         &self,
         init: &mut Initialiser<'_, T, R>,
         standardisation: &Standardisation,
     ) -> Result<Box<dyn Network<T>>, ModelError> {
-        match self {
-            Self::Pan2021(config) => Ok(Box::new(Pan2021::new(init, config, standardisation)?)),
-            Self::Harvey2020(config) => {
-                Ok(Box::new(Harvey2020::new(init, config, standardisation)?))
-            }
-            Self::Interpolation(_) => Err(nothing_to_train("interpolation")),
-            Self::LinearPositions(_) => Err(nothing_to_train("linear_positions")),
-            Self::ZeroVelocity(_) => Err(nothing_to_train("zero_velocity")),
+        let network: Box<dyn Network<T>> = match self {
+            Self::Pan2021(config) => Box::new(Pan2021::new(init, config, standardisation)?),
+            Self::Harvey2020(config) => Box::new(Harvey2020::new(init, config, standardisation)?),
+            Self::Interpolation(_) => return Err(nothing_to_train("interpolation")),
+            Self::LinearPositions(_) => return Err(nothing_to_train("linear_positions")),
+            Self::ZeroVelocity(_) => return Err(nothing_to_train("zero_velocity")),
+        };
+        match init.exceeded() {
+            None => Ok(network),
+            Some(most) => Err(ModelError::TooLarge { most }),
         }
     }
 

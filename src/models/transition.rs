@@ -165,4 +165,9 @@ pub enum ModelError {
     NotFinite { what: String },
     #[error("{model}: {reason}")]
     Model { model: String, reason: String },
+    /// For a saved model: more than its file holds.
+    #[error(
+        "the model of the config has more than {most} weights; choose smaller sizes in [model]"
+    )]
+    TooLarge { most: usize },
 }

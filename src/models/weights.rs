@@ -15,8 +15,11 @@ use thiserror::Error;
 use crate::autograd::Parameters;
 use crate::data::{Standardisation, hexadecimal};
 use crate::motion::features::FEATURES;
+use crate::nn::MOST_WEIGHTS;
 
 const METADATA: &str = "keydance";
+/// Bytes that a weights file may have beside its weights: config, names, shapes, statistics.
+const LARGEST_HEADER: u64 = 1 << 24;
 const MEAN: &str = "feature_mean";
 const STD: &str = "feature_std";
 const POSITION_SCALE: &str = "position_scale";
@@ -29,6 +32,12 @@ pub enum WeightsError {
     File {
         path: PathBuf,
         cause: std::io::Error,
+    },
+    #[error("{path} has {found} bytes, weights of this model have at most {most}")]
+    TooLarge {
+        path: PathBuf,
+        found: u64,
+        most: u64,
     },
     #[error("{path} is not a whole safetensors file: {cause}")]
     Format {
@@ -138,17 +147,31 @@ pub fn digest(parameters: &Parameters<f32>) -> String {
     hexadecimal(&hash.finalize())
 }
 
+/// The content of a file of at most `weights` weights.
+pub(crate) fn read_file(path: &Path, weights: usize) -> Result<Vec<u8>, WeightsError> {
+    let unreadable = |cause| WeightsError::File {
+        path: path.into(),
+        cause,
+    };
+    let found = std::fs::metadata(path).map_err(unreadable)?.len();
+    let most = 4 * weights as u64 + LARGEST_HEADER;
+    if found > most {
+        return Err(WeightsError::TooLarge {
+            path: path.into(),
+            found,
+            most,
+        });
+    }
+    std::fs::read(path).map_err(unreadable)
+}
+
 impl SavedWeights {
     /// Reads a weights file.
     ///
     /// # Errors
-    /// It cannot be read, is damaged, or is not keydance's.
+    /// It cannot be read, is too large for any model, is damaged, or is not keydance's.
     pub fn read(path: &Path) -> Result<Self, WeightsError> {
-        let content = std::fs::read(path).map_err(|cause| WeightsError::File {
-            path: path.into(),
-            cause,
-        })?;
-        Self::parse(&content, path)
+        Self::parse(&read_file(path, MOST_WEIGHTS)?, path)
     }
 
     /// The same from a file's content; `path` is what errors call it.
@@ -201,6 +224,13 @@ impl SavedWeights {
             standardisation,
             parameters,
         })
+    }
+
+    /// Most weights that a model may have to be built for these: not many more than there are, as the sizes in a file cannot be
+    /// trusted; but some, so that a parameter which the file lacks is named.
+    pub fn most_weights(&self) -> usize {
+        let weights: usize = self.parameters.values().map(ArrayD::len).sum();
+        2 * weights + (1 << 20)
     }
 
     /// Puts the values into a model's parameters.

@@ -8,6 +8,8 @@ use super::clip::{Clip, Pose};
 const ROUNDING: f64 = 1e-4;
 /// How many new frames one old frame may become.
 const FINEST: f64 = 120.0;
+/// Most frames (over two hours at 30 a second) that a clip may be refined to: a small file of few frames a second would fill memory.
+const MOST_FRAMES: usize = 250_000;
 
 /// Why a clip cannot be resampled.
 #[derive(Debug, Error, PartialEq)]
@@ -24,6 +26,14 @@ pub enum ResampleError {
         frame_time: f64,
         fps: f64,
     },
+    #[error(
+        "{clip} would have {frames} frames at {fps} a second, more than {MOST_FRAMES}; cut it into parts"
+    )]
+    TooLong {
+        clip: String,
+        frames: usize,
+        fps: f64,
+    },
 }
 
 /// The clip at `fps` frames a second: rotations slerped, translations interpolated linearly, from the first frame on up to the last.
@@ -32,7 +42,7 @@ pub enum ResampleError {
 /// other up to such rounding, they are taken to be so exactly.
 ///
 /// # Errors
-/// `fps` is not a positive number, or a frame of the clip would become more than 120.
+/// `fps` is not a positive number, or a frame of the clip would become more than 120 or the clip more than 250,000.
 pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
     if !(fps.is_finite() && fps > 0.0) {
         return Err(ResampleError::Rate { fps });
@@ -50,6 +60,13 @@ pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
     }
     let last = clip.poses.len() - 1;
     let frames = (last as f64 / step + 1e-9).floor() as usize + 1;
+    if step < 1.0 && frames > MOST_FRAMES {
+        return Err(ResampleError::TooLong {
+            clip: clip.name,
+            frames,
+            fps,
+        });
+    }
     let poses = (0..frames)
         .map(|frame| pose_at(&clip.poses, frame as f64 * step))
         .collect();
@@ -161,6 +178,13 @@ mod tests {
         assert!(matches!(
             resample(even(5, 3600.0), 30.0),
             Err(ResampleError::TooCoarse { .. })
+        ));
+        assert!(matches!(
+            resample(even(3000, 3.9), 30.0),
+            Err(ResampleError::TooLong {
+                frames: 350_884,
+                ..
+            })
         ));
         assert!(matches!(
             resample(even(5, 0.1), f64::NAN),

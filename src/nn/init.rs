@@ -5,21 +5,53 @@ use rand::{Rng, RngExt};
 
 use crate::autograd::{BlockId, ParameterId, Parameters, Real};
 
+/// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and memory would end first.
+pub const MOST_WEIGHTS: usize = 1 << 28;
+
 /// Adds named parameters with initial values drawn from one stream.
 pub struct Initialiser<'a, T, R> {
     parameters: &'a mut Parameters<T>,
     rng: R,
+    most: usize,
+    added: usize,
 }
 
 impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
+    /// For a model of at most [`MOST_WEIGHTS`] weights.
     pub fn new(parameters: &'a mut Parameters<T>, rng: R) -> Self {
-        Self { parameters, rng }
+        Self::limited(parameters, rng, MOST_WEIGHTS)
+    }
+
+    /// For a model of at most `most` weights. What is added beyond is empty: sizes from a file that cannot be trusted take no memory.
+    pub fn limited(parameters: &'a mut Parameters<T>, rng: R, most: usize) -> Self {
+        Self {
+            parameters,
+            rng,
+            most,
+            added: 0,
+        }
+    }
+
+    /// The limit, where more weights were asked for.
+    pub fn exceeded(&self) -> Option<usize> {
+        (self.added > self.most).then_some(self.most)
+    }
+
+    /// The shape where the limit allows it, else one of the same axes with nothing in it.
+    fn admit(&mut self, shape: &[usize]) -> IxDyn {
+        let weights = shape.iter().fold(1, |n: usize, &k| n.saturating_mul(k));
+        self.added = self.added.saturating_add(weights);
+        match self.exceeded() {
+            None => IxDyn(shape),
+            Some(_) => IxDyn(&vec![0; shape.len()]),
+        }
     }
 
     /// Uniform between `-bound` and `bound`.
     pub fn uniform(&mut self, name: String, shape: &[usize], bound: f64) -> (ParameterId, BlockId) {
+        let shape = self.admit(shape);
         let rng = &mut self.rng;
-        let value = ArrayD::from_shape_simple_fn(IxDyn(shape), || {
+        let value = ArrayD::from_shape_simple_fn(shape, || {
             T::from_f64((2.0 * rng.random::<f64>() - 1.0) * bound)
         });
         self.parameters.add(name, value)
@@ -31,7 +63,7 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
         shape: &[usize],
         value: f64,
     ) -> (ParameterId, BlockId) {
-        let value = ArrayD::from_elem(IxDyn(shape), T::from_f64(value));
+        let value = ArrayD::from_elem(self.admit(shape), T::from_f64(value));
         self.parameters.add(name, value)
     }
 

@@ -11,7 +11,7 @@ mod positions;
 mod transformer;
 
 pub use attention::{MultiHeadAttention, NarrowAttention};
-pub use init::Initialiser;
+pub use init::{Initialiser, MOST_WEIGHTS};
 pub use linear::Linear;
 pub use lstm::Lstm;
 pub use mlp::{Activation, Mlp};

@@ -10,7 +10,7 @@ use super::durable::{self, FileError};
 use super::state::{self, Header, Moments, StateError};
 use crate::autograd::Parameters;
 use crate::data::hexadecimal;
-use crate::models::weights::{SavedWeights, WeightsError};
+use crate::models::weights::{self, SavedWeights, WeightsError};
 
 /// Name of the weights file, in a checkpoint and in a finished run.
 pub const WEIGHTS_FILE: &str = "weights.safetensors";
@@ -58,7 +58,7 @@ impl Checkpoint {
             parameters.len(),
         )?;
         let path = folder.join(WEIGHTS_FILE);
-        let content = fs::read(&path).map_err(FileError::at(&path, "read"))?;
+        let content = weights::read_file(&path, parameters.weights())?;
         let found = file_digest(&content);
         if found != header.weights_file_digest {
             return Err(CheckpointError::OtherWeights {

@@ -143,7 +143,7 @@ impl RunFolder {
         let config = ExperimentConfig::parse(&saved.config, &path.display().to_string())?;
         let mut parameters = Parameters::new();
         let rng = Streams::new(config.seed).initialisation();
-        let mut init = Initialiser::new(&mut parameters, rng);
+        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
         let network = config.model.build(&mut init, &saved.standardisation)?;
         saved.load_into(&mut parameters)?;
         Ok(TrainedModel::new(

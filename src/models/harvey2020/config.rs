@@ -98,15 +98,15 @@ impl Harvey2020Config {
                 reason,
             })
         };
-        for (key, value) in [
-            ("hidden", self.hidden),
-            ("code", self.code),
-            ("recurrent", self.recurrent),
-            ("arrival_frames", self.arrival_frames),
-            ("noise_whole", self.noise_whole),
+        for (key, value, most) in [
+            ("hidden", self.hidden, 65_536),
+            ("code", self.code, 4096),
+            ("recurrent", self.recurrent, 65_536),
+            ("arrival_frames", self.arrival_frames, 4096),
+            ("noise_whole", self.noise_whole, 65_536),
         ] {
-            if !(1..=65_536).contains(&value) {
-                return complain(format!("model.{key} = {value}: expected 1 to 65536"));
+            if !(1..=most).contains(&value) {
+                return complain(format!("model.{key} = {value}: expected 1 to {most}"));
             }
         }
         if !self.code.is_multiple_of(2) {

@@ -144,17 +144,17 @@ impl Pan2021Config {
                 return complain(format!("model.{key} = {value}: expected 1 or 2"));
             }
         }
-        for (key, value) in [
-            ("hidden", self.hidden),
-            ("code", self.code),
-            ("heads", self.heads),
-            ("encoder_layers", self.encoder_layers),
-            ("decoder_layers", self.decoder_layers),
-            ("feed_forward", self.feed_forward),
-            ("loss.key_frames", self.loss.key_frames),
+        for (key, value, most) in [
+            ("hidden", self.hidden, 65_536),
+            ("code", self.code, 4096),
+            ("heads", self.heads, 256),
+            ("encoder_layers", self.encoder_layers, 64),
+            ("decoder_layers", self.decoder_layers, 64),
+            ("feed_forward", self.feed_forward, 65_536),
+            ("loss.key_frames", self.loss.key_frames, 65_536),
         ] {
-            if !(1..=65_536).contains(&value) {
-                return complain(format!("model.{key} = {value}: expected 1 to 65536"));
+            if !(1..=most).contains(&value) {
+                return complain(format!("model.{key} = {value}: expected 1 to {most}"));
             }
         }
         if !self.code.is_multiple_of(self.heads) {
