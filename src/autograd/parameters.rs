@@ -187,6 +187,11 @@ impl<T: Real> Gradients<T> {
         self.values.iter_mut().map(Vec::as_mut_slice)
     }
 
+    pub(super) fn block(&self, parameters: &Parameters<T>, id: BlockId) -> &[T] {
+        let block = &parameters.blocks[id.0];
+        &self.values[block.parameter][block.range.clone()]
+    }
+
     pub(super) fn block_mut(&mut self, parameters: &Parameters<T>, id: BlockId) -> &mut [T] {
         let block = &parameters.blocks[id.0];
         &mut self.values[block.parameter][block.range.clone()]

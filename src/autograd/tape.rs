@@ -102,8 +102,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.dropout_key = key;
     }
 
-    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs that is not finite (slow: for
-    /// finding the cause).
+    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs, weights among them, that is not
+    /// finite (slow: for finding the cause).
     pub fn with_trace(mut self) -> Self {
         self.trace = true;
         self
@@ -390,6 +390,7 @@ impl<'a, T: Real> Tape<'a, T> {
                 stagings: &mut stagings,
                 gradients,
                 output: Var(index as u32),
+                staged: !self.trace,
             };
             context.flush_staging(Var(index as u32));
             if let Some(mut operation) = operation {
@@ -407,13 +408,17 @@ impl<'a, T: Real> Tape<'a, T> {
                         stagings: &mut stagings,
                         gradients,
                         output: Var(index as u32),
+                        staged: !self.trace,
                     };
                     operation.backward(&mut dy, &mut context);
                     if self.trace
-                        && let Some(what) = self.nodes[index]
-                            .inputs
-                            .iter()
-                            .find_map(|input| slots[input.index()].as_deref().and_then(not_finite))
+                        && let Some(what) = self.nodes[index].inputs.iter().find_map(|input| {
+                            let gradient = match self.nodes[input.index()].value {
+                                Value::Block(id) => Some(gradients.block(self.parameters, id)),
+                                _ => slots[input.index()].as_deref(),
+                            };
+                            gradient.and_then(not_finite)
+                        })
                     {
                         return Err(self.non_finite(index, what, "gradient"));
                     }
@@ -566,6 +571,8 @@ pub struct Backward<'s, T: Real> {
     stagings: &'s mut [Option<Staging<T>>],
     gradients: &'s mut Gradients<T>,
     output: Var,
+    /// Whether rows for a weight's gradient are collected; not where each operation's share in it is looked at.
+    staged: bool,
 }
 
 impl<'s, T: Real> Backward<'s, T> {
@@ -644,7 +651,7 @@ impl<'s, T: Real> Backward<'s, T> {
         if !self.needs_gradient(weight) || dy.rows == 0 {
             return;
         }
-        if dy.rows >= DIRECT_ROWS {
+        if dy.rows >= DIRECT_ROWS || !self.staged {
             if let Some(target) = self.target(weight) {
                 let fresh = target.fresh;
                 product_at(dy, x, MatMut::new(target.data, dy.cols, x.cols), !fresh);

@@ -182,3 +182,44 @@ fn the_first_gradient_that_is_not_finite_is_traced_to_the_operation_that_made_it
         "{message}"
     );
 }
+
+/// A loss whose gradient is finite everywhere but in the product that is the gradient of a weight: 1e30 * 1e30 in f32.
+fn backward_of_an_overflow_in_a_weight(
+    trace: bool,
+    rows: usize,
+) -> (Result<(), AutogradError>, f32) {
+    let mut parameters = Parameters::<f32>::new();
+    let (_, block) = parameters.add("w", arr2(&[[1e-30f32]]).into_dyn());
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    if trace {
+        tape = tape.with_trace();
+    }
+    let x = tape.constant(ArrayD::from_elem(IxDyn(&[rows, 1]), 1e30f32));
+    let w = tape.block(block);
+    let y = tape.linear(x, w, None, false).unwrap();
+    let total = tape.sum(y);
+    let large = tape.affine(total, 1e30, 0.0);
+    assert_eq!(tape.check_finite(), Ok(()));
+    let result = tape.backward(large, &mut gradients);
+    (result, gradients.iter().flatten().sum())
+}
+
+#[test]
+fn an_overflow_in_the_gradient_of_a_weight_is_traced_to_the_operation_that_made_it() {
+    // Few rows are collected before they are multiplied, many are not.
+    for rows in [1, 200] {
+        let (result, gradient) = backward_of_an_overflow_in_a_weight(false, rows);
+        assert_eq!((result, gradient), (Ok(()), f32::INFINITY));
+        let (result, _) = backward_of_an_overflow_in_a_weight(true, rows);
+        let message = result.unwrap_err().to_string();
+        assert!(message.starts_with("linear "), "{message}");
+        assert!(
+            message.contains("infinity")
+                && message.contains("gradient")
+                && message.contains("[1, 1]"),
+            "{message}"
+        );
+    }
+}
