@@ -357,6 +357,11 @@ pub(super) mod property {
             .boxed()
     }
 
+    /// A factor on what saturates a function: mild or strong.
+    pub fn strength() -> BoxedStrategy<f64> {
+        prop_oneof![Just(1.0), Just(30.0)].boxed()
+    }
+
     /// A shape of one to three axes, zero-size ones among them.
     pub fn shapes() -> BoxedStrategy<Vec<usize>> {
         prop::collection::vec(0usize..5, 1..4).boxed()

@@ -213,12 +213,12 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::LstmWeights;
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Case, case, strength};
 
-    /// Two steps through time, so that the state's gradient flows back and the weights' adds up.
+    /// Two steps through time, so that the state's gradient flows back and the weights' adds up; gates saturated and not.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 0usize..4, 1usize..3, any::<u64>())
-            .prop_map(|(batch, inputs, n, seed)| {
+        (0usize..3, 0usize..4, 1usize..3, strength(), any::<u64>())
+            .prop_map(|(batch, inputs, n, strength, seed)| {
                 let shapes: [&[usize]; 6] = [
                     &[batch, inputs],
                     &[batch, 2 * n],
@@ -227,15 +227,16 @@ pub(super) mod gradient {
                     &[4 * n],
                     &[4 * n],
                 ];
-                case(&shapes, seed, 0.0, |tape, v| {
+                case(&shapes, seed, 0.0, move |tape, v| {
+                    let x = tape.affine(v[0], strength, 0.0);
                     let weights = LstmWeights {
                         weight_ih: v[2],
                         weight_hh: v[3],
                         bias_ih: v[4],
                         bias_hh: v[5],
                     };
-                    let state = tape.lstm_cell(v[0], v[1], weights)?;
-                    tape.lstm_cell(v[0], state, weights)
+                    let state = tape.lstm_cell(x, v[1], weights)?;
+                    tape.lstm_cell(x, state, weights)
                 })
             })
             .boxed()

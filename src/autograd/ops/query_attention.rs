@@ -407,12 +407,12 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::QueryAttentionWeights;
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Case, case, strength};
 
-    /// Two heads that share no weight, with and without dropout.
+    /// Two heads that share no weight, with and without dropout; small scores and large.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..10, 1usize..3, 1usize..4, any::<bool>(), any::<u64>())
-            .prop_map(|(batch, tokens, dh, width, dropout, seed)| {
+        (0usize..3, 1usize..10, 1usize..3, 1usize..4, any::<bool>(), strength(), any::<u64>())
+            .prop_map(|(batch, tokens, dh, width, dropout, strength, seed)| {
                 let weight: &[usize] = &[dh, width];
                 let shapes: [&[usize]; 7] = [
                     &[batch, 2 * dh],
@@ -430,7 +430,8 @@ pub(super) mod gradient {
                         values: vec![v[4], v[5]],
                         value_bias: v[6],
                     };
-                    tape.query_attention(v[0], v[1], weights, tokens, 0.3)
+                    let queries = tape.affine(v[0], strength, 0.0);
+                    tape.query_attention(queries, v[1], weights, tokens, 0.3)
                 })
             })
             .boxed()

@@ -81,11 +81,14 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Case, case, shapes, strength};
 
     pub fn cases() -> BoxedStrategy<Case> {
-        (shapes(), any::<u64>())
-            .prop_map(|(x, seed)| case(&[&x], seed, 0.0, |tape, v| Ok(tape.softmax(v[0]))))
+        (shapes(), strength(), any::<u64>())
+            .prop_map(|(x, strength, seed)| case(&[&x], seed, 0.0, move |tape, v| {
+                let logits = tape.affine(v[0], strength, 0.0);
+                Ok(tape.softmax(logits))
+            }))
             .boxed()
     }
 }
