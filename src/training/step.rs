@@ -160,7 +160,8 @@ impl Stepper {
     /// Computes the batch and moves the weights. Returns the losses before the move, and the norm of the gradient.
     ///
     /// # Errors
-    /// The network refuses the batch; or a loss or gradient is not finite, and then weights and moments are as before.
+    /// The network refuses the batch; or a loss or gradient is not finite, and then weights and moments are as before; or the
+    /// weights are not after it.
     pub fn step(
         &mut self,
         input: &StepInput<'_>,
@@ -230,7 +231,13 @@ impl Stepper {
             .pool
             .install(|| adam.step(parameters, &mut self.gradients, input.learning_rate));
         match norm {
-            Ok(norm) => Ok((sum, norm)),
+            Ok(norm) => match first_not_finite(parameters) {
+                None => Ok((sum, norm)),
+                Some((name, shape)) => Err(non_finite(
+                    input,
+                    format!("it left {name} {shape:?} with a NaN or an infinity"),
+                )),
+            },
             Err(error) => {
                 let cause = self
                     .trace(input, parameters, &shards)
@@ -248,13 +255,15 @@ impl Stepper {
         shards: &[&[Window]],
     ) -> Option<AutogradError> {
         let mut workspace = Workspace::new();
+        // One sum for all shards: each may be finite where their sum is not.
+        let gradients = self.gradients.first_mut()?;
+        gradients.set_zero();
         let with_windows = shards
             .iter()
             .enumerate()
             .filter(|(_, windows)| !windows.is_empty());
         with_windows
-            .zip(&mut self.gradients)
-            .find_map(|((shard, windows), gradients)| {
+            .map(|(shard, windows)| {
                 run_shard(
                     input,
                     parameters,
@@ -264,9 +273,19 @@ impl Stepper {
                     gradients,
                     true,
                 )
-                .err()
             })
+            .find_map(Result::err)
     }
+}
+
+/// The first parameter with a NaN or an infinity, and its shape.
+fn first_not_finite(parameters: &Parameters<f32>) -> Option<(&str, &[usize])> {
+    // To the end in any case, so that it vectorises.
+    let finite = |values: &[f32]| values.iter().fold(true, |all, x| all & x.is_finite());
+    parameters
+        .iter()
+        .find(|(_, value)| !value.as_slice().is_some_and(finite))
+        .map(|(name, value)| (name, value.shape()))
 }
 
 /// Losses of a shard; its gradients are added to `gradients`.
