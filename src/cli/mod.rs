@@ -28,6 +28,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::autograd::kernels::Isa;
 use crate::training::TrainingError;
 
 /// Exit code of a training that ended because a loss or gradient was not finite.
@@ -78,6 +79,7 @@ impl Cli {
     /// # Errors
     /// Whatever the subcommand could not do.
     pub fn run(self) -> anyhow::Result<ExitCode> {
+        Isa::asked_for()?;
         match self.command {
             Command::BenchGenerate(args) => bench_generate::run(args)?,
             Command::BenchLayers(args) => bench_layers::run(args)?,

@@ -2,9 +2,22 @@
 
 use std::sync::OnceLock;
 
+use thiserror::Error;
+
 use super::blocked::Kernels;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2, avx512};
+
+/// Environment variable that names the set to use: `avx512`, `avx2` or `portable`.
+const CHOICE: &str = "KEYDANCE_ISA";
+
+/// The environment asks for an instruction set that there is not.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{CHOICE}={asked}: expected an instruction set that this CPU has: {available}")]
+pub struct IsaError {
+    pub asked: String,
+    pub available: String,
+}
 
 /// An instruction set that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,14 +34,41 @@ impl Isa {
     /// Every set, best first.
     pub const ALL: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
 
-    /// The best set this CPU has.
+    /// The set that `KEYDANCE_ISA` asks for (to get the numbers of another machine), else the best set this CPU has.
     #[inline]
     pub fn detected() -> Self {
         static DETECTED: OnceLock<Isa> = OnceLock::new();
         *DETECTED.get_or_init(|| {
-            let available = Self::ALL.into_iter().find(|isa| isa.is_available());
-            available.unwrap_or(Self::Portable)
+            let best = || Self::ALL.into_iter().find(|isa| isa.is_available());
+            let asked = Self::asked_for().ok().flatten();
+            asked.or_else(best).unwrap_or(Self::Portable)
         })
+    }
+
+    /// The set that the environment asks for, if it does.
+    ///
+    /// # Errors
+    /// It asks for one that this CPU lacks, or that is none.
+    pub fn asked_for() -> Result<Option<Self>, IsaError> {
+        let Some(asked) = std::env::var_os(CHOICE) else {
+            return Ok(None);
+        };
+        let available = || Self::ALL.into_iter().filter(|isa| isa.is_available());
+        match available().find(|isa| *isa.name() == asked) {
+            Some(isa) => Ok(Some(isa)),
+            None => Err(IsaError {
+                asked: asked.to_string_lossy().into_owned(),
+                available: available().map(Self::name).collect::<Vec<_>>().join(", "),
+            }),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "avx512",
+            Self::Avx2 => "avx2",
+            Self::Portable => "portable",
+        }
     }
 
     /// Whether this CPU has the set.
