@@ -579,6 +579,7 @@ fn training_is_the_same_to_the_bit_on_any_threads_and_after_a_resume() {
     before
         .run(Some(&run), &mut |report| stop(report.step))
         .unwrap();
+    drop(run);
     let run = RunFolder::resume(&path, &config).unwrap();
     let mut after = Trainer::new(config, &data, 2).unwrap();
     assert_eq!(after.resume(&run).unwrap().steps, 4);

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use common::training::{config, dataset, trainer, trainer_of};
 use keydance::models::weights::SavedWeights;
 use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
+use keydance::training::state::decode;
 use keydance::training::{
     ExperimentConfig, Outcome, RunFolder, RunState, StepReport, Trainer, TrainingError,
 };
@@ -105,7 +106,7 @@ fn a_resumed_training_ends_at_the_same_bits_wherever_it_stopped() {
         let mut before = trainer(&data, 2);
         let run = RunFolder::create(&path, before.config()).unwrap();
         let mut reports = train(&mut before, Some(&run), Some(stop));
-        drop(before);
+        drop((before, run));
         let mut after = trainer(&data, 1);
         let run = RunFolder::resume(&path, after.config()).unwrap();
         assert_eq!(after.resume(&run).unwrap().steps, stop);
@@ -286,6 +287,98 @@ fn a_run_of_another_config_or_other_data_is_refused_with_both_sides() {
         text.contains("digest synthetic") && text.contains("digest other"),
         "{text}"
     );
+}
+
+#[test]
+fn two_trainings_do_not_write_to_one_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let first = RunFolder::create(&path, &config()).unwrap();
+    for second in [
+        RunFolder::create(&path, &config()),
+        RunFolder::resume(&path, &config()),
+        RunFolder::replace(&path, &config()),
+    ] {
+        let text = second.unwrap_err().to_string();
+        assert!(
+            text.contains("another training writes to") && text.contains("run"),
+            "{text}"
+        );
+    }
+    assert_eq!(RunFolder::open(&path).config().unwrap(), config());
+    drop(first);
+    assert!(RunFolder::resume(&path, &config()).is_ok());
+}
+
+#[test]
+fn a_run_whose_config_an_older_version_wrote_with_fewer_keys_goes_on_to_the_same_bits() {
+    let expected = uninterrupted();
+    let data = dataset();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let mut before = trainer(&data, 2);
+    let run = RunFolder::create(&path, before.config()).unwrap();
+    let text = fs::read_to_string(run.config_path()).unwrap();
+    let fewer = text
+        .replace("beta2 = 0.999\n", "")
+        .replace("[log]\nevery_steps = 1\n", "");
+    assert_eq!(fewer.lines().count() + 3, text.lines().count());
+    fs::write(run.config_path(), fewer).unwrap();
+    train(&mut before, Some(&run), Some(14));
+    drop((before, run));
+    // The state names the digest of what that version wrote.
+    let state = path.join("checkpoints/step-00000014").join(STATE_FILE);
+    let (mut header, moments) = decode(&fs::read(&state).unwrap(), &state).unwrap();
+    header.config_digest = "of fewer keys".into();
+    let format = bincode::config::standard();
+    let mut content = b"KDSTATE\0\x01\0\0\0".to_vec();
+    content.extend(bincode::serde::encode_to_vec(&header, format).unwrap());
+    content.extend(bincode::serde::encode_to_vec(&moments, format).unwrap());
+    let checksum = Sha256::digest(&content);
+    content.extend_from_slice(&checksum);
+    fs::write(&state, content).unwrap();
+    assert_eq!(finish(&path).unwrap(), (14, vec![], expected));
+}
+
+#[test]
+fn a_checkpoint_of_another_run_is_refused_with_both_digests() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = killed_run(folder.path());
+    let data = dataset();
+    let mut other = config();
+    other.seed = 5;
+    let mut other = trainer_of(other, &data, 2);
+    let run = RunFolder::create(&folder.path().join("other"), other.config()).unwrap();
+    train(&mut other, Some(&run), Some(30));
+    let newest = "checkpoints/step-00000030";
+    fs::rename(run.path().join(newest), path.join(newest)).unwrap();
+    let text = finish(&path).unwrap_err().to_string();
+    assert!(
+        text.contains("step-00000030 belongs to a config with digest"),
+        "{text}"
+    );
+}
+
+#[test]
+fn weights_that_a_step_leaves_beyond_all_numbers_are_never_saved() {
+    let data = dataset();
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = config();
+    // More than an f32 can hold: the first update is infinite, its loss was not.
+    config.optimiser.learning_rate = 1e39;
+    config.checkpoint.every_steps = 1;
+    let mut trainer = trainer_of(config.clone(), &data, 2);
+    let run = RunFolder::create(&folder.path().join("run"), &config).unwrap();
+    let error = trainer
+        .run(Some(&run), &mut |_| ControlFlow::Continue(()))
+        .unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("step 1 ") && text.contains("it left hidden.weight [8, 154] with a NaN"),
+        "{text}"
+    );
+    assert!(list(&run.checkpoints()).unwrap().is_empty());
+    assert_eq!(run.manifest().unwrap().unwrap().state, RunState::Diverged);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use thiserror::Error;
 #[error("{path} cannot be {action}: {cause}")]
 pub struct FileError {
     pub path: PathBuf,
-    /// "written", "read", "created", "removed".
+    /// "written", "read", "created", "removed", "locked".
     pub action: &'static str,
     pub cause: io::Error,
 }

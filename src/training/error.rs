@@ -44,7 +44,7 @@ pub enum TrainingError {
         length: usize,
         cause: Box<AutogradError>,
     },
-    /// The training diverged. The weights are those before the step.
+    /// The training diverged, at this step or, where its cause are the weights, in the update that ended it.
     #[error(
         "step {step} ({windows} windows of {length} frames) is not finite: {cause}; the last checkpoint is as it was; \
          try a lower optimiser.learning_rate or optimiser.clip_norm=1.0"
@@ -66,10 +66,6 @@ pub enum TrainingError {
         "validation.every_steps needs validation clips; set some aside with data.validation_share, such as 0.1, or leave [validation] out"
     )]
     NoValidationClips,
-    #[error(
-        "{path} is locked: another process trains into this run; wait for it, or give another --out"
-    )]
-    Busy { path: PathBuf },
     #[error("{path}, line {line}, is no line of a training's log: {cause}")]
     Log {
         path: PathBuf,
@@ -84,6 +80,24 @@ pub enum TrainingError {
     State(#[from] StateError),
     #[error("{path} holds a run already; go on with --resume, or give another --out")]
     RunExists { path: PathBuf },
+    #[error(
+        "another training writes to {path} at this moment; wait for its end or stop it, or give another --out"
+    )]
+    Locked { path: PathBuf },
+    /// What a run of another version of the program holds cannot be read or gone on with by this one.
+    #[error("{path} was made by keydance {made_by}, this is {this}, which cannot use it: {cause}")]
+    OtherVersion {
+        path: PathBuf,
+        made_by: String,
+        this: String,
+        cause: Box<TrainingError>,
+    },
+    #[error("{path} has format {found}, and this version of keydance knows formats up to {newest}")]
+    ManifestFormat {
+        path: PathBuf,
+        found: u32,
+        newest: u32,
+    },
     #[error(
         "{path} holds a run with another config ({}); values there, values now; a run is resumed with the config and the --set \
          that it was started with",

@@ -1,8 +1,8 @@
 //! `log.jsonl`: a line for every step that is logged.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -11,6 +11,9 @@ use super::durable::FileError;
 use super::error::TrainingError;
 use super::step::StepReport;
 use crate::evaluation::Evaluation;
+
+/// Bytes at the end of a log that hold a whole line.
+const LAST_LINES: u64 = 1 << 14;
 
 /// What figures need of a line.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -45,7 +48,28 @@ pub(super) fn read(path: &Path) -> Result<Vec<LogLine>, TrainingError> {
     whole.lines().enumerate().map(parse).collect()
 }
 
-/// A log, open for more lines and locked: two trainings do not write into one run.
+/// How far the last line of a log says that the training is.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub(super) struct Last {
+    pub step: u64,
+    pub frame_steps: u64,
+    pub frame_steps_per_second: f64,
+}
+
+/// The last whole line, if there is one, without reading the others.
+pub(super) fn last(path: &Path) -> Option<Last> {
+    let mut file = File::open(path).ok()?;
+    let len = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(len.saturating_sub(LAST_LINES)))
+        .ok()?;
+    let mut tail = Vec::new();
+    file.read_to_end(&mut tail).ok()?;
+    let end = tail.iter().rposition(|&byte| byte == b'\n')?;
+    let line = tail[..end].rsplit(|&byte| byte == b'\n').next()?;
+    serde_json::from_slice(line).ok()
+}
+
+/// A log, open for more lines.
 pub(super) struct Log {
     path: PathBuf,
     file: File,
@@ -60,8 +84,8 @@ impl Log {
     /// Opens a run's log and cuts it back to the lines of the first `steps` steps.
     ///
     /// # Errors
-    /// Another process trains into the run, or the file cannot be read or written.
-    pub fn open(path: PathBuf, steps: u64) -> Result<Self, TrainingError> {
+    /// The file cannot be read or written.
+    pub fn open(path: PathBuf, steps: u64) -> Result<Self, FileError> {
         let at = |action| FileError::at(&path, action);
         let file = OpenOptions::new()
             .create(true)
@@ -69,10 +93,6 @@ impl Log {
             .read(true)
             .open(&path)
             .map_err(at("written"))?;
-        // A file system without locks is no reason not to train.
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-            return Err(TrainingError::Busy { path });
-        }
         let mut reader = BufReader::new(&file);
         let (mut kept, mut line) = (0, Vec::new());
         loop {

@@ -1,5 +1,6 @@
 //! A run's manifest: what was trained, on what, where, and how far it got.
 
+use std::fmt;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
@@ -7,6 +8,36 @@ use serde::{Deserialize, Serialize};
 use super::config::ExperimentConfig;
 use super::schedule::Schedule;
 use crate::data::{DanceClip, DataRanges, Dataset};
+
+/// Format of the manifest; raised when an older program would misread a newer one. Manifests from before it was written have 1.
+pub(super) const FORMAT: u32 = 1;
+
+/// A version of this program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Build {
+    pub version: String,
+    /// The commit, where it was built in a git checkout.
+    pub commit: Option<String>,
+}
+
+impl Build {
+    /// The version that runs.
+    pub fn this() -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
+        }
+    }
+}
+
+impl fmt::Display for Build {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.commit {
+            Some(commit) => write!(f, "{} (commit {commit})", self.version),
+            None => f.write_str(&self.version),
+        }
+    }
+}
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,6 +55,8 @@ pub enum RunState {
 /// `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
+    #[serde(default = "first_format")]
+    pub format: u32,
     /// The config's name.
     pub name: String,
     pub seed: u64,
@@ -57,6 +90,10 @@ pub struct Manifest {
     pub weights_digest: Option<String>,
 }
 
+fn first_format() -> u32 {
+    1
+}
+
 /// Size of a part of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
@@ -82,12 +119,14 @@ impl Manifest {
         parameters: usize,
         threads: usize,
     ) -> Self {
+        let Build { version, commit } = Build::this();
         Self {
+            format: FORMAT,
             name: config.name.clone(),
             seed: config.seed,
             state: RunState::Running,
-            version: env!("CARGO_PKG_VERSION").into(),
-            commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
+            version,
+            commit,
             cpu: cpu(),
             threads,
             started: now(),

@@ -6,6 +6,8 @@
 //! log.jsonl              a line a step: every loss term
 //! checkpoints/step-*/    weights.safetensors and state.bin
 //! weights.safetensors    the trained model, once finished
+//! evaluation*.json       its scores, and on what they were measured, once evaluated
+//! .lock                  locked while a training writes here
 //! ```
 
 use std::fs;
@@ -15,52 +17,51 @@ use super::checkpoint::{self, WEIGHTS_FILE};
 use super::config::ExperimentConfig;
 use super::durable::{self, FileError};
 use super::error::TrainingError;
+use super::lock::FolderLock;
 use super::log::{self, LogLine};
-use super::manifest::Manifest;
+use super::manifest::{self, Build, Manifest};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::models::TrainedModel;
 use crate::models::weights::SavedWeights;
 use crate::nn::Initialiser;
 
-const CONFIG: &str = "config.toml";
 const MANIFEST: &str = "manifest.json";
 const LOG: &str = "log.jsonl";
 const CHECKPOINTS: &str = "checkpoints";
 
-/// A folder that holds one run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A folder that holds one run. To write to it takes [`RunFolder::create`], [`RunFolder::replace`] or [`RunFolder::resume`], which
+/// keep all others from doing so while the value lives.
+#[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// None where it was opened to be read.
+    _lock: Option<FolderLock>,
 }
 
 impl RunFolder {
+    /// Name of the resolved config's file: a folder that has it is a run's.
+    pub const CONFIG: &str = "config.toml";
+
     /// A folder for a new run; made where there is none.
     ///
     /// # Errors
-    /// The folder holds a run already, or cannot be written.
+    /// The folder holds a run already, another training writes to it, or it cannot be written.
     pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
-        let run = Self { path: path.into() };
-        if [CONFIG, CHECKPOINTS, WEIGHTS_FILE]
-            .iter()
-            .any(|name| path.join(name).exists())
-        {
-            return Err(TrainingError::RunExists { path: path.into() });
-        }
-        fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
-        durable::replace(&path.join(CONFIG), config.to_toml()?.as_bytes())?;
+        let run = Self::locked(path)?;
+        run.begin(config)?;
         Ok(run)
     }
 
     /// A folder for a new run, in place of an earlier run of the same name.
     ///
     /// # Errors
-    /// The folder holds a run of another name, or cannot be written.
+    /// The folder holds a run of another name, another training writes to it, or it cannot be written.
     pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
-        let run = Self::open(path);
+        let run = Self::locked(path)?;
         if run.config_path().exists() && run.config()?.name == config.name {
             checkpoint::remove(&run.checkpoints())?;
-            for file in [MANIFEST, LOG, WEIGHTS_FILE, CONFIG].map(|name| path.join(name)) {
+            for file in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG].map(|name| path.join(name)) {
                 match fs::remove_file(&file) {
                     Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                         return Err(FileError::at(&file, "removed")(error).into());
@@ -69,33 +70,64 @@ impl RunFolder {
                 }
             }
         }
-        Self::create(path, config)
+        run.begin(config)?;
+        Ok(run)
     }
 
     /// The folder of a run that goes on; a new run where it has not begun.
     ///
     /// # Errors
-    /// The run there has another config, or the folder cannot be read or written.
+    /// The run there has another config, another training writes to it, or it cannot be read or written.
     pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
-        let run = Self { path: path.into() };
-        if !path.join(CONFIG).exists() {
-            return Self::create(path, config);
+        let run = Self::locked(path)?;
+        if !run.config_path().exists() {
+            run.begin(config)?;
+            return Ok(run);
         }
-        let saved = run.config()?;
-        let differences = saved.differences(config)?;
-        if !differences.is_empty() {
-            return Err(TrainingError::OtherConfig {
-                path: path.join(CONFIG),
-                differences,
-            });
-        }
+        run.check_config(config)?;
         checkpoint::remove_partial(&run.checkpoints())?;
         Ok(run)
     }
 
-    /// The folder of a run, as it is.
+    /// The folder of a run, as it is, to read.
     pub fn open(path: &Path) -> Self {
-        Self { path: path.into() }
+        Self {
+            path: path.into(),
+            _lock: None,
+        }
+    }
+
+    fn locked(path: &Path) -> Result<Self, TrainingError> {
+        fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
+        Ok(Self {
+            path: path.into(),
+            _lock: Some(FolderLock::take(path)?),
+        })
+    }
+
+    fn begin(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+        let path = &self.path;
+        if [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE]
+            .iter()
+            .any(|name| path.join(name).exists())
+        {
+            return Err(TrainingError::RunExists { path: path.into() });
+        }
+        durable::replace(&path.join(Self::CONFIG), config.to_toml()?.as_bytes())?;
+        Ok(())
+    }
+
+    /// Refuses a config that differs from the run's.
+    fn check_config(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+        let differences = self.config()?.differences(config)?;
+        if differences.is_empty() {
+            Ok(())
+        } else {
+            Err(TrainingError::OtherConfig {
+                path: self.config_path(),
+                differences,
+            })
+        }
     }
 
     pub fn path(&self) -> &Path {
@@ -114,7 +146,7 @@ impl RunFolder {
 
     /// The file of the resolved config.
     pub fn config_path(&self) -> PathBuf {
-        self.path.join(CONFIG)
+        self.path.join(Self::CONFIG)
     }
 
     /// The file of the manifest.
@@ -127,7 +159,8 @@ impl RunFolder {
     /// # Errors
     /// It cannot be read, or this version does not know one of its keys.
     pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
-        Ok(ExperimentConfig::load(&self.config_path(), &[])?)
+        ExperimentConfig::load(&self.config_path(), &[])
+            .map_err(|error| self.or_other_version(error.into()))
     }
 
     /// The trained model.
@@ -140,7 +173,8 @@ impl RunFolder {
             return Err(TrainingError::NotFinished { path });
         }
         let saved = SavedWeights::read(&path)?;
-        let config = ExperimentConfig::parse(&saved.config, &path.display().to_string())?;
+        let config = ExperimentConfig::parse(&saved.config, &path.display().to_string())
+            .map_err(|error| self.or_other_version(error.into()))?;
         let mut parameters = Parameters::new();
         let rng = Streams::new(config.seed).initialisation();
         let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
@@ -171,16 +205,42 @@ impl RunFolder {
     /// The manifest; none before the training has begun.
     ///
     /// # Errors
-    /// It cannot be read or is none.
+    /// It cannot be read, is none, or is of a newer version of the program.
     pub fn manifest(&self) -> Result<Option<Manifest>, TrainingError> {
         let path = self.manifest_path();
         if !path.exists() {
             return Ok(None);
         }
         let text = fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
-        match serde_json::from_str(&text) {
+        let read = serde_json::from_str(&text).map_err(|cause| TrainingError::Manifest {
+            path: path.clone(),
+            cause,
+        });
+        let read = read.and_then(|manifest: Manifest| match manifest.format {
+            ..=manifest::FORMAT => Ok(manifest),
+            found => Err(TrainingError::ManifestFormat {
+                path,
+                found,
+                newest: manifest::FORMAT,
+            }),
+        });
+        match read {
             Ok(manifest) => Ok(Some(manifest)),
-            Err(cause) => Err(TrainingError::Manifest { path, cause }),
+            Err(error) => Err(self.or_other_version(error)),
+        }
+    }
+
+    /// The error, with the version of the program that made the run where it is another one.
+    pub(super) fn or_other_version(&self, error: TrainingError) -> TrainingError {
+        let text = fs::read_to_string(self.path.join(MANIFEST)).unwrap_or_default();
+        match serde_json::from_str::<Build>(&text) {
+            Ok(made_by) if made_by != Build::this() => TrainingError::OtherVersion {
+                path: self.path.clone(),
+                made_by: made_by.to_string(),
+                this: Build::this().to_string(),
+                cause: Box::new(error),
+            },
+            _ => error,
         }
     }
 

@@ -35,6 +35,11 @@ impl RunFolder {
     /// # Errors
     /// There are no weights, their file is damaged, or they are those of another model than `config` describes.
     pub fn trained_model(&self, config: &ExperimentConfig) -> Result<TrainedModel, TrainingError> {
+        self.read_model(config)
+            .map_err(|error| self.or_other_version(error))
+    }
+
+    fn read_model(&self, config: &ExperimentConfig) -> Result<TrainedModel, TrainingError> {
         let path = self.newest_weights()?;
         let saved = SavedWeights::read(&path)?;
         let origin = format!("the config in {}", path.display());

@@ -207,6 +207,11 @@ impl<'d> Trainer<'d> {
     /// # Errors
     /// The run is of another config, other data or another model, or there are checkpoints but none is whole.
     pub fn resume(&mut self, run: &RunFolder) -> Result<Resumed, TrainingError> {
+        self.resume_newest(run)
+            .map_err(|error| run.or_other_version(error))
+    }
+
+    fn resume_newest(&mut self, run: &RunFolder) -> Result<Resumed, TrainingError> {
         let mut damaged = Vec::new();
         let mut aside: Vec<PathBuf> = Vec::new();
         for (_, path) in checkpoint::list(&run.checkpoints())?.into_iter().rev() {
