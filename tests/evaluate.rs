@@ -527,3 +527,109 @@ fn interpolation_on_the_dance_data_has_the_known_scores() {
         assert!((found - known).abs() < 1e-4, "N = {length}: {found}");
     }
 }
+
+/// The lines that `keydance runs` prints, cells parted by two blanks or more.
+fn runs(folder: &Path) -> Vec<Vec<String>> {
+    let output = keydance("runs").arg(folder).output().unwrap();
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    let cells = |line: &str| line.split("  ").map(str::trim).map(String::from).collect();
+    text.lines()
+        .map(|line| {
+            let all: Vec<String> = cells(line);
+            all.into_iter().filter(|cell| !cell.is_empty()).collect()
+        })
+        .collect()
+}
+
+#[test]
+fn runs_are_listed_with_state_progress_speed_scores_and_version() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let run = copied_run();
+    evaluate(run.path()).assert().success();
+    for (name, files) in [
+        (
+            "b/evaluated",
+            &[
+                "config.toml",
+                "manifest.json",
+                WEIGHTS,
+                "evaluation.json",
+                "evaluation_data.json",
+            ][..],
+        ),
+        ("a", &["config.toml", "manifest.json"]),
+        ("not_begun", &["config.toml"]),
+        ("damaged_manifest", &["config.toml"]),
+        ("damaged_scores", &["config.toml", "manifest.json", WEIGHTS]),
+    ] {
+        fs::create_dir_all(place(name)).unwrap();
+        for file in files {
+            fs::copy(run.path().join(file), place(name).join(file)).unwrap();
+        }
+    }
+    fs::write(
+        place("damaged_manifest").join("manifest.json"),
+        "{\"name\": 3}",
+    )
+    .unwrap();
+    fs::write(place("damaged_scores").join("evaluation.json"), "[]").unwrap();
+    evaluate(&FIXTURE.path("interpolation.toml"))
+        .arg("--out")
+        .arg(place("interpolation"))
+        .assert()
+        .success();
+    // What is no run.
+    fs::create_dir_all(place("photographs/old")).unwrap();
+    fs::write(place("photographs/notes.txt"), "no run").unwrap();
+    fs::write(place("experiment.toml"), SMALL).unwrap();
+
+    let lines = runs(folder.path());
+    let first: Vec<&str> = lines.iter().map(|cells| cells[0].as_str()).collect();
+    assert_eq!(
+        first[..7],
+        [
+            "run",
+            "a",
+            "b/evaluated",
+            "damaged_manifest",
+            "damaged_scores",
+            "interpolation",
+            "not_begun"
+        ]
+    );
+    let manifest = json(&run.path().join("manifest.json"));
+    let steps = format!("{0}/{0}", manifest["steps"]);
+    let scores = json(&run.path().join("evaluation.json"));
+    let lrp = |length: &str| format!("{:.1}", scores["lrp"][length].as_f64().unwrap());
+    let evaluated = &lines[2];
+    assert_eq!(evaluated[1..5], ["small", "finished", &steps, "100"]);
+    assert!(evaluated[6].parse::<f64>().unwrap() > 0.0, "{evaluated:?}");
+    assert_eq!(evaluated[7..11], ["10", "50", "100", "150"].map(lrp));
+    assert!(evaluated[11].starts_with(env!("CARGO_PKG_VERSION")));
+    assert_eq!(lines[1][2], "finished, no weights");
+    assert_eq!(lines[1].len(), 8);
+    assert_eq!(lines[3][1], "damaged");
+    assert_eq!(lines[4][2], "finished");
+    assert_eq!(lines[5][1..3], ["interpolation", "needs no training"]);
+    assert_eq!(lines[5].len(), 8);
+    assert_eq!(lines[6][1..], ["small", "not begun"]);
+    // What is wrong is said below.
+    assert!(first[7].starts_with("damaged_manifest: ") && first[7].contains("is not a manifest"));
+    assert!(first[8].starts_with("damaged_scores: ") && first[8].contains("holds no scores"));
+
+    // A run's folder alone; then folders without any.
+    assert_eq!(runs(&place("b/evaluated"))[1][1..3], ["small", "finished"]);
+    for (folder, words) in [
+        (place("photographs"), "holds no run"),
+        (place("nowhere"), "cannot be read"),
+    ] {
+        keydance("runs")
+            .arg(folder)
+            .assert()
+            .failure()
+            .code(1)
+            .stderr(contains(words));
+    }
+}

@@ -13,6 +13,7 @@ use keydance::training::state::decode;
 use keydance::training::{
     ExperimentConfig, Outcome, RunFolder, RunState, StepReport, Trainer, TrainingError,
 };
+use sha2::{Digest, Sha256};
 
 /// Trains until `stop` steps are done, or to the end.
 fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: Option<u64>) -> Vec<StepReport> {

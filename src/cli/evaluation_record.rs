@@ -87,6 +87,12 @@ impl EvaluationRecord {
         write_json(path, &scores)
     }
 
+    /// Whether a folder has scores on the test clips, sound or not.
+    pub fn is_in(folder: &Path) -> bool {
+        let [scores, _] = Self::files(ClipChoice::Test);
+        folder.join(scores).exists()
+    }
+
     /// Writes both files into a folder that exists.
     ///
     /// # Errors

@@ -16,6 +16,7 @@ mod generate;
 mod gradcheck;
 mod progress;
 mod reproduce;
+mod runs;
 mod stop;
 mod subject;
 mod tables;
@@ -69,6 +70,7 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     /// Train and evaluate every config of a folder, and write tables, figures and a manifest
     Reproduce(reproduce::ReproduceArgs),
+    Runs(runs::RunsArgs),
     /// Set scores beside the paper's in its tables 2 to 4
     Tables(tables::TablesArgs),
 }
@@ -92,6 +94,7 @@ impl Cli {
             Command::Figures(args) => figures::run(args)?,
             Command::Generate(args) => generate::run(*args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
+            Command::Runs(args) => runs::run(args)?,
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => evaluate::run(args)?,
             Command::Reproduce(args) => return reproduce::run(args),
