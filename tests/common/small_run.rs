@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
@@ -46,16 +46,6 @@ impl SmallRun {
         keydance()
             .args(self.train_arguments(run, more))
             .output()
-            .unwrap()
-    }
-
-    /// A training in the background, its output in pipes.
-    pub fn begin(&self, run: &Path, more: &[&str]) -> Child {
-        keydance()
-            .args(self.train_arguments(run, more))
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
             .unwrap()
     }
 }
