@@ -97,3 +97,40 @@ fn line_of(text: &str, start: usize) -> usize {
             .unwrap_or(0);
     1 + text[..row].matches('\n').count()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GOOD: &str = "frame,x,y\n0,1.5,90\n1,-2,91\n2,3e1,92\n";
+
+    proptest! {
+        #[test]
+        fn a_damaged_table_is_an_error_that_names_it_or_rows_of_sound_numbers(
+            flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
+            cut in any::<prop::sample::Index>(), doubled in 0usize..5, dropped in 0usize..5,
+        ) {
+            let mut lines: Vec<&str> = GOOD.split_inclusive('\n').collect();
+            lines.insert(doubled.min(3), lines[doubled.min(3)]);
+            if dropped < lines.len() {
+                lines.remove(dropped);
+            }
+            let mut bytes = lines.concat().into_bytes();
+            for (place, byte) in flips {
+                let place = place.index(bytes.len());
+                bytes[place] ^= byte;
+            }
+            bytes.truncate(cut.index(2 * bytes.len()).max(1));
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), bytes).unwrap();
+            match read(file.path(), &["x", "y"], 3) {
+                Err(error) => prop_assert!(error.to_string().contains(&file.path().display().to_string())),
+                Ok(rows) => {
+                    prop_assert_eq!(rows.dim(), (3, 2));
+                    prop_assert!(rows.iter().all(|number| number.abs() <= LARGEST));
+                }
+            }
+        }
+    }
+}
