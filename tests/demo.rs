@@ -65,14 +65,21 @@ fn the_reduced_demo_ends_ahead_of_interpolation_and_writes_every_result() {
     let manifest = json(&out.join("manifest.json"));
     assert_eq!(manifest["state"], "finished");
     assert_eq!(manifest["steps_done"], manifest["steps"]);
+}
 
-    // Again, hardly trained: the results are those of the second demo alone, whether ahead or behind.
-    let digest = manifest["weights_digest"].clone();
-    let ended = demo(&out).args(["--fraction", "0.0002"]).output().unwrap();
-    assert!([Some(0), Some(4)].contains(&ended.status.code()));
-    let manifest = json(&out.join("manifest.json"));
-    assert_ne!(manifest["weights_digest"], digest);
-    assert_eq!(manifest["state"], "finished");
+#[test]
+fn a_demo_takes_the_place_of_an_earlier_one_whether_ahead_or_behind() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    // Hardly trained.
+    let digests = ["0.0004", "0.0002"].map(|fraction| {
+        let ended = demo(&out).args(["--fraction", fraction]).output().unwrap();
+        assert!([Some(0), Some(4)].contains(&ended.status.code()));
+        let manifest = json(&out.join("manifest.json"));
+        assert_eq!(manifest["state"], "finished");
+        manifest["weights_digest"].clone()
+    });
+    assert_ne!(digests[0], digests[1]);
 }
 
 #[test]
