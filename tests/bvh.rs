@@ -214,6 +214,90 @@ fn channels_that_cannot_hold_a_motion_are_refused_by_joint() {
     assert!(Bvh::from_clip(&clip, layout).is_ok());
 }
 
+/// What a document is made of.
+struct Parts {
+    skeleton: Skeleton,
+    channels: Vec<Vec<Channel>>,
+    frame_time: f64,
+    motion: Array2<f64>,
+}
+
+#[test]
+fn a_document_of_parts_that_no_file_could_hold_is_refused_with_the_fault() {
+    let whole = parse(TWO_JOINTS);
+    let with = |change: fn(&mut Parts)| {
+        let mut parts = Parts {
+            skeleton: whole.skeleton().clone(),
+            channels: whole.channels().to_vec(),
+            frame_time: whole.frame_time(),
+            motion: whole.motion().clone(),
+        };
+        change(&mut parts);
+        let Parts {
+            skeleton,
+            channels,
+            frame_time,
+            motion,
+        } = parts;
+        Bvh::new("x.bvh".into(), skeleton, channels, frame_time, motion)
+    };
+    assert_eq!(with(|_| ()).unwrap().skeleton(), whole.skeleton());
+    let cases: [(&str, fn(&mut Parts)); 14] = [
+        ("must begin with a root", |p| p.skeleton.joints.clear()),
+        ("must begin with a root", |p| {
+            p.skeleton.joints[0].parent = Some(0)
+        }),
+        ("no joint name", |p| {
+            p.skeleton.joints[1].name = "a{b".into()
+        }),
+        ("two joints are named Hips", |p| {
+            p.skeleton.joints[1].name = "Hips".into()
+        }),
+        ("Left Arm stands before its parent", |p| {
+            p.skeleton.joints[1].parent = Some(1)
+        }),
+        ("Left Arm has an offset", |p| {
+            p.skeleton.joints[1].end_sites[0].x = f64::NAN
+        }),
+        ("Hips has an offset beyond", |p| {
+            p.skeleton.joints[0].offset.y = 1e7
+        }),
+        ("2 joints have 1 lists of channels", |p| {
+            p.channels.truncate(1)
+        }),
+        ("Hips has a channel twice", |p| {
+            p.channels[0][1] = p.channels[0][0]
+        }),
+        ("2 joints have 0 channels between", |p| {
+            p.channels.iter_mut().for_each(Vec::clear)
+        }),
+        ("have 9 channels, the motion rows 10", |p| {
+            p.channels[0].truncate(5)
+        }),
+        ("there are no frames", |p| p.motion = Array2::zeros((0, 10))),
+        ("frame time 0 s", |p| p.frame_time = 0.0),
+        ("frame 1 holds a number", |p| {
+            p.motion[[1, 3]] = f64::INFINITY
+        }),
+    ];
+    for (words, change) in cases {
+        let text = with(change).unwrap_err().to_string();
+        assert!(text.contains("x.bvh") && text.contains(words), "{text}");
+    }
+
+    let mut clip = whole.to_clip();
+    let layout = channel_layout(&clip, [Axis::X, Axis::Y, Axis::Z]);
+    let text = Bvh::from_clip(&clip, layout[..1].to_vec()).unwrap_err();
+    assert!(text.to_string().contains("2 joints have 1 lists"), "{text}");
+    clip.poses[1].rotations.pop();
+    let text = Bvh::from_clip(&clip, layout).unwrap_err();
+    assert!(
+        text.to_string()
+            .contains("frame 1 is not a pose of its 2 joints"),
+        "{text}"
+    );
+}
+
 #[test]
 fn channels_do_not_jump_between_frames() {
     let joint = Joint {

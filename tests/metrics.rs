@@ -342,6 +342,55 @@ fn a_length_without_windows_is_an_error_that_names_the_longest_clip() {
     );
 }
 
+/// A model that does not do what was asked.
+struct Wrong(fn(&[TransitionRequest]) -> Result<Vec<Transition>, ModelError>);
+
+impl TransitionModel for Wrong {
+    fn name(&self) -> &str {
+        "wrong"
+    }
+
+    fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
+        (self.0)(requests)
+    }
+}
+
+#[test]
+fn a_protocol_without_lengths_and_a_model_that_fails_are_errors_that_say_where() {
+    let clips = clips();
+    let lengths = |lengths: &[usize]| Protocol {
+        lengths: lengths.to_vec(),
+        ..Protocol::default()
+    };
+    let fails = Wrong(|_| {
+        Err(ModelError::NotFinite {
+            what: "a weight".into(),
+        })
+    });
+    let text = |protocol: Protocol, model: &Wrong, clips: &[DanceClip]| {
+        format!(
+            "{:#}",
+            anyhow::Error::from(protocol.evaluate(model, clips).unwrap_err())
+        )
+    };
+    assert!(text(lengths(&[]), &fails, &clips).contains("no transition lengths"));
+    assert!(text(lengths(&[0]), &fails, &clips).contains("0 frames"));
+    let found = text(lengths(&[5]), &fails, &clips);
+    assert!(
+        found.contains("wrong") && found.contains(&clips[0].name) && found.contains("a weight"),
+        "{found}"
+    );
+    let found = text(lengths(&[5]), &Wrong(|_| Ok(Vec::new())), &clips);
+    assert!(found.contains("wrong") && found.contains('0'), "{found}");
+    let mut short = clips.clone();
+    short[0].clip.poses.truncate(7);
+    let found = text(lengths(&[5]), &fails, &short);
+    assert!(
+        found.contains(&short[0].name) && found.contains('7'),
+        "{found}"
+    );
+}
+
 #[test]
 fn the_json_has_lengths_as_keys_and_avg_and_reads_back() {
     let scores = |values: [f64; 2]| LengthScores::new([10, 150].into_iter().zip(values).collect());

@@ -772,3 +772,59 @@ fn with_roots_from_the_keyframe_a_dance_elsewhere_on_the_floor_is_the_same_dance
         assert!(difference(&above, raised) > 0.1);
     }
 }
+
+#[test]
+fn sizes_that_no_model_has_are_refused_by_their_key() {
+    type Change = fn(&mut Pan2021Config);
+    let refusal = |change: Change| {
+        let mut config = whole_model().small();
+        change(&mut config);
+        let mut parameters = Parameters::<f32>::new();
+        let mut init = Initialiser::new(&mut parameters, ChaCha8Rng::seed_from_u64(3));
+        let model = ModelConfig::Pan2021(config);
+        let built = model.build(&mut init, &Standardisation::fit([]));
+        built.err().unwrap().to_string()
+    };
+    let cases: [(Change, &str); 9] = [
+        (
+            |config| config.lstms = 3,
+            "model.lstms = 3: expected 1 or 2",
+        ),
+        (
+            |config| config.decoders = 0,
+            "model.decoders = 0: expected 1 or 2",
+        ),
+        (
+            |config| config.hidden = 0,
+            "model.hidden = 0: expected 1 to 65536",
+        ),
+        (
+            |config| config.encoder_layers = 65,
+            "model.encoder_layers = 65: expected 1 to 64",
+        ),
+        (
+            |config| config.heads = 3,
+            "model.code = 8: expected a multiple of model.heads = 3",
+        ),
+        (
+            |config| config.window = 6,
+            "model.window = 6: expected an odd number",
+        ),
+        (
+            |config| config.dropout = 1.0,
+            "model.dropout = 1: expected at least 0 and below 1",
+        ),
+        (
+            |config| config.loss.root = -1.0,
+            "model.loss.root = -1: expected 0 or more",
+        ),
+        (
+            |config| (config.hidden, config.code) = (65_536, 4096),
+            "more than 268435456 weights",
+        ),
+    ];
+    for (change, words) in cases {
+        let text = refusal(change);
+        assert!(text.contains(words), "{text}");
+    }
+}

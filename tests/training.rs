@@ -7,12 +7,15 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use common::training::{config, dataset, trainer, trainer_of};
+use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::models::weights::SavedWeights;
+use keydance::models::{Batch, Feed, LossTerms, Network};
 use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
 use keydance::training::state::decode;
 use keydance::training::{
     ExperimentConfig, Outcome, RunFolder, RunState, StepReport, Trainer, TrainingError,
 };
+use ndarray::Array3;
 use sha2::{Digest, Sha256};
 
 /// Trains until `stop` steps are done, or to the end.
@@ -358,6 +361,57 @@ fn a_checkpoint_of_another_run_is_refused_with_both_digests() {
         text.contains("step-00000030 belongs to a config with digest"),
         "{text}"
     );
+}
+
+/// A loss of |w| that is finite where its gradient is not: sqrt(w^2) at 0.
+struct Cusp(BlockId);
+
+impl Network<f32> for Cusp {
+    fn losses(
+        &self,
+        tape: &mut Tape<'_, f32>,
+        _batch: &Batch<f32>,
+        _feed: Feed,
+    ) -> Result<LossTerms, AutogradError> {
+        let weight = tape.block(self.0);
+        let square = tape.square(weight);
+        let size = tape.sqrt(square);
+        let total = tape.sum(size);
+        Ok(LossTerms {
+            total,
+            terms: vec![("size", total)],
+            critics: None,
+        })
+    }
+
+    fn predict(
+        &self,
+        _tape: &mut Tape<'_, f32>,
+        _batch: &Batch<f32>,
+    ) -> Result<Array3<f32>, AutogradError> {
+        Ok(Array3::zeros((0, 0, 0)))
+    }
+}
+
+#[test]
+fn a_gradient_that_is_not_finite_is_traced_to_its_operation_and_changes_no_weight() {
+    let data = dataset();
+    let folder = tempfile::tempdir().unwrap();
+    let mut trainer = Trainer::with_network(config(), &data, 2, |init, _| {
+        Ok(Box::new(Cusp(init.constant("w".into(), &[3], 0.0).1)))
+    })
+    .unwrap();
+    let before = trainer.weights_digest();
+    let run = RunFolder::create(&folder.path().join("run"), &config()).unwrap();
+    let error = trainer
+        .run(Some(&run), &mut |_| ControlFlow::Continue(()))
+        .unwrap_err();
+    let text = error.to_string();
+    for words in ["step 1 (", "sqrt (operation", "gradient of shape [3]"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert_eq!(trainer.weights_digest(), before);
+    assert_eq!(run.manifest().unwrap().unwrap().state, RunState::Diverged);
 }
 
 #[test]

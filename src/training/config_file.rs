@@ -456,6 +456,33 @@ mod tests {
             ("name=[1", ["--set name=[1", "not TOML"]),
             ("name=../x", ["name = ../x", "letters"]),
             ("schedule=3", ["--set schedule=3", "schedule"]),
+            (
+                "checkpoint.every_steps=0",
+                ["every_steps = 0", "at least 1"],
+            ),
+            ("checkpoint.keep=0", ["checkpoint.keep = 0", "from 1 to"]),
+            ("log.every_steps=0", ["log.every_steps = 0", "at least 1"]),
+            (
+                "scheduled_sampling.decay=1.5",
+                ["scheduled_sampling.decay = 1.5", "at most 1"],
+            ),
+            ("optimiser.beta1=1", ["optimiser.beta1 = 1", "below 1"]),
+            (
+                "optimiser.clip_norm=0",
+                ["optimiser.clip_norm = 0", "a number above 0"],
+            ),
+            (
+                "seed=9223372036854775808",
+                ["seed=9223372036854775808", "seed"],
+            ),
+            (
+                "validation={ every_steps = 0 }",
+                ["validation.every_steps = 0", "at least 1"],
+            ),
+            (
+                "validation={ every_steps = 9, lengths = [] }",
+                ["validation.lengths = []", "at least one length"],
+            ),
         ] {
             let text = load(&[("a.toml", "")], &[set]).unwrap_err();
             assert!(
