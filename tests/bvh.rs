@@ -225,7 +225,8 @@ struct Parts {
 #[test]
 fn a_document_of_parts_that_no_file_could_hold_is_refused_with_the_fault() {
     let whole = parse(TWO_JOINTS);
-    let with = |change: fn(&mut Parts)| {
+    type Change = fn(&mut Parts);
+    let with = |change: Change| {
         let mut parts = Parts {
             skeleton: whole.skeleton().clone(),
             channels: whole.channels().to_vec(),
@@ -242,7 +243,7 @@ fn a_document_of_parts_that_no_file_could_hold_is_refused_with_the_fault() {
         Bvh::new("x.bvh".into(), skeleton, channels, frame_time, motion)
     };
     assert_eq!(with(|_| ()).unwrap().skeleton(), whole.skeleton());
-    let cases: [(&str, fn(&mut Parts)); 14] = [
+    let cases: [(&str, Change); 14] = [
         ("must begin with a root", |p| p.skeleton.joints.clear()),
         ("must begin with a root", |p| {
             p.skeleton.joints[0].parent = Some(0)
