@@ -376,8 +376,9 @@ fn a_protocol_without_lengths_and_a_model_that_fails_are_errors_that_say_where()
     assert!(text(lengths(&[]), &fails, &clips).contains("no transition lengths"));
     assert!(text(lengths(&[0]), &fails, &clips).contains("0 frames"));
     let found = text(lengths(&[5]), &fails, &clips);
+    let of_a_clip = clips.iter().any(|clip| found.contains(&clip.name));
     assert!(
-        found.contains("wrong") && found.contains(&clips[0].name) && found.contains("a weight"),
+        found.contains("wrong") && of_a_clip && found.contains("a weight"),
         "{found}"
     );
     let found = text(lengths(&[5]), &Wrong(|_| Ok(Vec::new())), &clips);
