@@ -13,9 +13,9 @@ use keydance::models::pan2021::{Controllers, LossWeights, Output, Pan2021, Pan20
 use keydance::models::{
     Batch, Feed, ModelConfig, Network, TrainedModel, Transition, TransitionModel, TransitionRequest,
 };
-use keydance::motion::features::{FEATURES, FRAME, ROOT_POSITION};
+use keydance::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
 use keydance::nn::Initialiser;
-use ndarray::{Array3, Axis, s};
+use ndarray::{Array2, Array3, ArrayView1, Axis, s};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -717,8 +717,33 @@ fn moved(request: &TransitionRequest, shift: [f64; 3]) -> TransitionRequest {
     moved
 }
 
+/// The same request on a floor turned by `angle` about Y, rad.
+fn turned(request: &TransitionRequest, angle: f64) -> TransitionRequest {
+    let turn = glam::DQuat::from_rotation_y(angle);
+    let around = |x: f64, y: f64, z: f64| (turn * glam::DVec3::new(x, y, z)).to_array();
+    let mut turned = request.clone();
+    for keyframe in [&mut turned.start, &mut turned.target] {
+        keyframe.pose.translations[0] = turn * keyframe.pose.translations[0];
+        let features = &mut keyframe.features;
+        for columns in [ROOT_POSITION, ROOT_VELOCITY] {
+            let at = columns.start;
+            let vector = around(features[at], features[at + 1], features[at + 2]);
+            features
+                .slice_mut(s![columns])
+                .assign(&ArrayView1::from(&vector));
+        }
+        features[FACING.start] += angle;
+    }
+    for mut place in turned.root_trajectory.rows_mut() {
+        let vector = around(place[0], place[1], place[2]);
+        place.assign(&ArrayView1::from(&vector));
+    }
+    turned
+}
+
 #[test]
-fn with_roots_from_the_keyframe_a_dance_elsewhere_on_the_floor_is_the_same_dance() {
+fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction_is_the_same_dance()
+{
     let generated = generate(&ChoreographyConfig {
         clips: 2,
         frames_per_clip: 120,
@@ -734,7 +759,12 @@ fn with_roots_from_the_keyframe_a_dance_elsewhere_on_the_floor_is_the_same_dance
     let request = window_request(&clip.clip, start, window.view()).unwrap();
     let shift = [250.0, 0.0, -130.0];
     let raised = [0.0, 40.0, 0.0];
-    for root_frame in [RootFrame::Keyframe, RootFrame::World] {
+    let angle = 2.0;
+    for (root_frame, same_elsewhere, same_turned) in [
+        (RootFrame::World, false, false),
+        (RootFrame::Keyframe, true, false),
+        (RootFrame::KeyframeFacing, true, true),
+    ] {
         let views: Vec<_> = clips.iter().map(|clip| clip.features.view()).collect();
         let standardisation = root_frame.standardisation(views, length);
         let config = Pan2021Config {
@@ -753,23 +783,43 @@ fn with_roots_from_the_keyframe_a_dance_elsewhere_on_the_floor_is_the_same_dance
             request.clone(),
             moved(&request, shift),
             moved(&request, raised),
+            turned(&request, angle),
         ];
-        let [here, there, above] = model.transitions(&requests).unwrap().try_into().unwrap();
+        let [here, there, above, around] =
+            model.transitions(&requests).unwrap().try_into().unwrap();
         // Near the trajectory that was asked for, in the world.
-        let near =
-            &here.frames.slice(s![.., ROOT_POSITION]) - &request.root_trajectory.slice(s![1.., ..]);
-        assert!(near.iter().all(|x| x.abs() < 150.0), "{near:?}");
-        let difference = |other: &Transition, shift: [f64; 3]| {
-            let mut difference = &other.frames - &here.frames;
+        let near = |transition: &Transition, request: &TransitionRequest| {
+            let missed = &transition.frames.slice(s![.., ROOT_POSITION])
+                - &request.root_trajectory.slice(s![1.., ..]);
+            missed.iter().all(|x| x.abs() < 150.0)
+        };
+        assert!(near(&here, &request), "{root_frame:?}");
+        assert!(near(&around, &requests[3]), "{root_frame:?}");
+        let difference = |other: &Array2<f64>, shift: [f64; 3]| {
+            let mut difference = other - &here.frames;
             for (column, shift) in ROOT_POSITION.zip(shift) {
                 difference.column_mut(column).mapv_inplace(|x| x - shift);
             }
             difference.iter().fold(0f64, |most, x| most.max(x.abs()))
         };
-        let same = difference(&there, shift) < 1e-2;
-        assert_eq!(same, root_frame == RootFrame::Keyframe);
-        // Heights are above the floor in either.
-        assert!(difference(&above, raised) > 0.1);
+        let same = difference(&there.frames, shift) < 1e-2;
+        assert_eq!(same, same_elsewhere, "{root_frame:?}");
+        // Heights are above the floor in each.
+        assert!(difference(&above.frames, raised) > 0.1);
+        let mut back = around.frames;
+        let turn = glam::DQuat::from_rotation_y(-angle);
+        for mut frame in back.rows_mut() {
+            for at in [ROOT_POSITION.start, ROOT_VELOCITY.start] {
+                let vector = glam::DVec3::new(frame[at], frame[at + 1], frame[at + 2]);
+                let vector = (turn * vector).to_array();
+                frame
+                    .slice_mut(s![at..at + 3])
+                    .assign(&ArrayView1::from(&vector));
+            }
+            frame[FACING.start] -= angle;
+        }
+        let same = difference(&back, [0.0; 3]) < 1e-2;
+        assert_eq!(same, same_turned, "{root_frame:?}");
     }
 }
 

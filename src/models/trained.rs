@@ -8,9 +8,9 @@ use super::{
     Batch, ModelError, Network, PoseWindows, Transition, TransitionModel, TransitionRequest,
 };
 use crate::autograd::{Parameters, Tape, Workspace};
-use crate::data::window::wrap;
+use crate::data::root_frame::WindowFrame;
 use crate::data::{RootFrame, Standardisation};
-use crate::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::features::{FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 
 /// A trained network, in f32.
 pub struct TrainedModel {
@@ -53,39 +53,37 @@ impl TrainedModel {
         &self.standardisation
     }
 
-    /// Origin of the network's root positions in a request, cm.
-    fn origin(&self, request: &TransitionRequest) -> [f64; 3] {
-        let first = std::array::from_fn(|axis| request.root_trajectory[[0, axis]]);
-        self.root_frame.origin(first)
+    /// The frame of reference that the network sees a request in.
+    fn frame_of(&self, request: &TransitionRequest) -> WindowFrame {
+        let mut first = request.start.features.clone();
+        first
+            .slice_mut(s![ROOT_POSITION])
+            .assign(&request.root_trajectory.row(0));
+        self.root_frame.of_window(first.view())
     }
 
     /// The network's inputs for requests of one length: features `[N + 1, windows, 154]`, standardised, and the keyframes' poses where
     /// the network reads them; what is not given is 0.
     fn inputs(&self, requests: &[&TransitionRequest], length: usize) -> Batch<f32> {
         let mut features = Array3::zeros((length + 1, requests.len(), FEATURES));
-        let standardise = |value: f64, number: usize| {
-            ((value - self.standardisation.mean[number]) / self.standardisation.std[number]) as f32
-        };
         for (window, request) in requests.iter().enumerate() {
-            // As in training, the first frame faces within [-pi, pi) and the angle runs on from there.
-            let facing = request.start.features[FACING.start];
-            let shift = wrap(facing) - facing;
-            for (row, keyframe) in [(0, &request.start), (length, &request.target)] {
+            let mut rows = Array2::zeros((length + 1, FEATURES));
+            rows.row_mut(0).assign(&request.start.features);
+            rows.row_mut(length).assign(&request.target.features);
+            rows.slice_mut(s![.., ROOT_POSITION])
+                .assign(&request.root_trajectory);
+            rows.slice_mut(s![.., VELOCITY_FACTORS])
+                .assign(&request.velocity_factors);
+            let frame = self.frame_of(request);
+            rows.rows_mut().into_iter().for_each(|row| frame.enter(row));
+            let rows = self.standardisation.standardise(rows.view());
+            for (row, numbers) in rows.rows().into_iter().enumerate() {
+                let all = row == 0 || row == length;
                 for number in 0..FEATURES {
-                    let shift = if number == FACING.start { shift } else { 0.0 };
-                    let value = keyframe.features[number] + shift;
-                    features[[row, window, number]] = standardise(value, number);
-                }
-            }
-            let origin = self.origin(request);
-            for row in 0..=length {
-                for (k, number) in ROOT_POSITION.enumerate() {
-                    let place = request.root_trajectory[[row, k]] - origin[k];
-                    features[[row, window, number]] = standardise(place, number);
-                }
-                for (k, number) in VELOCITY_FACTORS.enumerate() {
-                    let factor = request.velocity_factors[[row, k]];
-                    features[[row, window, number]] = standardise(factor, number);
+                    if all || ROOT_POSITION.contains(&number) || VELOCITY_FACTORS.contains(&number)
+                    {
+                        features[[row, window, number]] = numbers[number] as f32;
+                    }
                 }
             }
         }
@@ -128,24 +126,15 @@ impl TrainedModel {
         }
         let mut transitions = Vec::with_capacity(requests.len());
         for (window, request) in requests.iter().enumerate() {
-            let facing = request.start.features[FACING.start];
-            let shift = wrap(facing) - facing;
-            let origin = self.origin(request);
-            let mut frames = Array2::zeros((length, FRAME));
-            for (mut out, row) in frames
+            let frame = self.frame_of(request);
+            let predicted = predicted.slice(s![.., window, ..]);
+            let mut frames = self
+                .standardisation
+                .restore(predicted.mapv(f64::from).view());
+            frames
                 .rows_mut()
                 .into_iter()
-                .zip(predicted.slice(s![.., window, ..]).rows())
-            {
-                for number in 0..FRAME {
-                    out[number] = f64::from(row[number]) * self.standardisation.std[number]
-                        + self.standardisation.mean[number];
-                }
-                out[FACING.start] -= shift;
-                for (number, origin) in ROOT_POSITION.zip(origin) {
-                    out[number] += origin;
-                }
-            }
+                .for_each(|row| frame.leave(row));
             let transition = Transition { frames };
             transition.check(length)?;
             transitions.push(transition);

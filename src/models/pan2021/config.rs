@@ -66,7 +66,7 @@ pub struct Pan2021Config {
     pub decoders: usize,
     /// false for "Without Velfac constraint": no velocity factor controller and no L_vfac.
     pub velocity_factor: bool,
-    /// Origin of root positions; the paper's is the world's.
+    /// Frame of reference of p^r, o^r and v^r; the paper's is the world's.
     pub root_frame: RootFrame,
     /// What the decoders give; the paper's give the frame itself.
     pub output: Output,
