@@ -8,7 +8,8 @@ use super::tape::Lists;
 
 /// A pool of buffers by size class, so that after the first steps a training step allocates nothing large.
 ///
-/// A class spans an eighth of a power of two, so that a reused buffer is at most that much longer than asked for.
+/// A class spans an eighth of a power of two. A free buffer of up to twice the length asked for will do, too: batches of one number of
+/// windows after the other must not each keep buffers of their own.
 #[derive(Default)]
 pub struct Workspace<T: Real> {
     free: BTreeMap<usize, Vec<Vec<T>>>,
@@ -40,17 +41,12 @@ impl<T: Real> Workspace<T> {
     /// A buffer of `len` numbers, whose content is whatever an earlier step left there.
     pub fn take(&mut self, len: usize) -> Vec<T> {
         let class = class(len);
-        match self.free.get_mut(&class).and_then(Vec::pop) {
-            Some(mut buffer) => {
-                buffer.resize(len, T::zero());
-                buffer
-            }
-            None => {
-                let mut buffer = Vec::with_capacity(class);
-                buffer.resize(len, T::zero());
-                buffer
-            }
-        }
+        let mut fitting = self.free.range_mut(class..=2 * class);
+        let mut buffer = fitting
+            .find_map(|(_, buffers)| buffers.pop())
+            .unwrap_or_else(|| Vec::with_capacity(class));
+        buffer.resize(len, T::zero());
+        buffer
     }
 
     /// A buffer of `len` zeros.

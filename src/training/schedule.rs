@@ -44,8 +44,8 @@ pub struct Schedule {
 impl Schedule {
     /// Counts the schedule for training clips of these numbers of frames.
     ///
-    /// The share `fraction` of the n windows of a length is rounded down over all lengths and epochs together, not in each: what
-    /// is left over goes to the next length, so that the total is right to one window.
+    /// With a `fraction` below 1 whole batches are dealt: the windows due of a length that fill none go to the next length, so that a
+    /// small share has steps of `batch_size` windows as any other, and the total is right to one batch.
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
         let mut schedule = Self {
             clip_frames: clip_frames.to_vec(),
@@ -82,7 +82,12 @@ impl Schedule {
                     schedule.skipped_lengths.push(length);
                 }
                 all += n;
-                let count = (all as f64 * config.fraction).floor() as usize - taken;
+                let due = (all as f64 * config.fraction).floor() as usize - taken;
+                let count = if config.fraction < 1.0 {
+                    (due - due % schedule.batch_size).min(n)
+                } else {
+                    due
+                };
                 taken += count;
                 schedule.frame_steps += (count * length) as u64;
                 schedule.whole_frame_steps += (n * length) as u64;
@@ -174,7 +179,7 @@ pub(super) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::collections::HashSet;
+    use std::collections::{HashMap, HashSet};
 
     fn schedule(frames: &[usize], config: &ScheduleConfig, seed: u64) -> Schedule {
         Schedule::new(frames, config, Streams::new(seed))
@@ -282,13 +287,24 @@ mod tests {
         }
 
         #[test]
-        fn a_fraction_takes_that_share_of_the_windows_without_repeats(
+        fn a_fraction_takes_that_share_of_the_windows_in_whole_batches_without_repeats(
             config in any_config(), frames in prop::collection::vec(20usize..300, 1..5), fraction in 0.001..1.0f64,
         ) {
             let part = ScheduleConfig { fraction, ..config.clone() };
             let trained = |config: &ScheduleConfig| {
                 let schedule = schedule(&frames, config, 5);
                 let batches: Vec<_> = (0..schedule.epochs()).map(|e| schedule.epoch(e)).collect();
+                for epoch in &batches {
+                    let mut of_length: HashMap<usize, Vec<usize>> = HashMap::new();
+                    for batch in epoch {
+                        of_length.entry(batch.length).or_default().push(batch.windows.len());
+                    }
+                    for (length, sizes) in of_length {
+                        let all = windows(&frames, length).windows.len();
+                        let full = sizes.iter().all(|&size| size == config.batch_size);
+                        assert!(full || sizes.iter().sum::<usize>() == all, "{sizes:?} of {all}");
+                    }
+                }
                 assert_eq!(batches.iter().map(Vec::len).sum::<usize>() as u64, schedule.steps());
                 for epoch in &batches {
                     let windows: Vec<_> = epoch.iter().flat_map(|b| b.windows.iter().map(|w| (b.length, w.clip, w.start))).collect();
@@ -299,7 +315,8 @@ mod tests {
             let all = |config: &ScheduleConfig| schedule(&frames, config, 5).whole_frame_steps();
             prop_assert_eq!(all(&part), schedule(&frames, &config, 5).frame_steps());
             let (whole, part) = (trained(&config), trained(&part));
-            prop_assert_eq!(part, (whole as f64 * fraction).floor() as usize);
+            let due = (whole as f64 * fraction).floor() as usize;
+            prop_assert!(part <= due && due - part < config.batch_size, "{} of {}", part, due);
         }
 
         #[test]
