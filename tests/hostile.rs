@@ -398,7 +398,6 @@ fn a_small_file_whose_config_names_a_huge_model_takes_no_memory() {
         let (_folder, run, config) = run_of_sizes(sizes);
         let text = run.trained_model(&config).err().unwrap().to_string();
         assert!(text.contains(words), "{text}");
-        assert!(run.model().is_err());
     }
     let (_folder, run, config) = run_of_sizes("code=65536");
     let text = run.trained_model(&config).err().unwrap().to_string();

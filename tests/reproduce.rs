@@ -361,6 +361,23 @@ fn results_and_runs_of_another_budget_or_other_data_are_refused_with_both_sides(
 }
 
 #[test]
+fn rows_that_could_not_be_trained_are_refused_before_any_is() {
+    let place = TempDir::new().unwrap();
+    for (set, words) in [
+        (
+            "validation.lengths=[5, 4000]",
+            "validation.lengths has 4000",
+        ),
+        ("model.lstms=2", "interpolation.toml is no row"),
+        ("schedule.batch_size=8192", "the schedule has no step"),
+    ] {
+        let refused = reproduce(place.path()).args(["--set", set]).assert();
+        refused.failure().stderr(contains(words));
+    }
+    assert!(!place.path().join("runs").exists());
+}
+
+#[test]
 fn names_and_seeds_that_no_config_has_are_errors_that_list_those_there_are() {
     let place = TempDir::new().unwrap();
     for (arguments, words) in [

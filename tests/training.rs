@@ -607,9 +607,10 @@ fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
     let config = ExperimentConfig::load(&file, &sets).unwrap();
     let mut trainer = Trainer::new(config.clone(), &data, 2).unwrap();
     let run = RunFolder::create(&folder.path().join("run"), &config).unwrap();
-    assert!(run.model().err().unwrap().to_string().contains("--resume"));
+    let none = run.trained_model(&config).err().unwrap().to_string();
+    assert!(none.contains("keydance train"), "{none}");
     train(&mut trainer, Some(&run), None);
-    let loaded = run.model().unwrap();
+    let loaded = run.trained_model(&config).unwrap();
     let digest = keydance::models::weights::digest(loaded.parameters());
     assert_eq!(digest, trainer.weights_digest());
     assert_eq!(

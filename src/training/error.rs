@@ -22,7 +22,7 @@ pub enum TrainingError {
     Model(#[from] ModelError),
     #[error(
         "the schedule has no step: no window of {min_len} to {max_len} frames at fraction {fraction} of {clips} training clips, the longest of \
-         {longest} frames; raise schedule.fraction or lower schedule.min_len"
+         {longest} frames; raise schedule.fraction, or lower schedule.batch_size or schedule.min_len"
     )]
     NothingToTrain {
         min_len: usize,
@@ -66,6 +66,10 @@ pub enum TrainingError {
         "validation.every_steps needs validation clips; set some aside with data.validation_share, such as 0.1, or leave [validation] out"
     )]
     NoValidationClips,
+    #[error(
+        "validation.lengths has {length}, but the longest of the validation clips has {longest} frames; give lengths of fewer frames"
+    )]
+    ValidationLength { length: usize, longest: usize },
     #[error("{path}, line {line}, is no line of a training's log: {cause}")]
     Log {
         path: PathBuf,
@@ -138,10 +142,6 @@ pub enum TrainingError {
         path: PathBuf,
         problems: Vec<String>,
     },
-    #[error(
-        "{path} is not there: the training is not finished; finish it with keydance train --resume"
-    )]
-    NotFinished { path: PathBuf },
     #[error("{path} is not a manifest: {cause}")]
     Manifest {
         path: PathBuf,

@@ -20,11 +20,6 @@ use super::error::TrainingError;
 use super::lock::FolderLock;
 use super::log::{self, LogLine};
 use super::manifest::{self, Build, Manifest};
-use super::streams::Streams;
-use crate::autograd::Parameters;
-use crate::models::TrainedModel;
-use crate::models::weights::SavedWeights;
-use crate::nn::Initialiser;
 
 const MANIFEST: &str = "manifest.json";
 const LOG: &str = "log.jsonl";
@@ -161,32 +156,6 @@ impl RunFolder {
     pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
         ExperimentConfig::load(&self.config_path(), &[])
             .map_err(|error| self.or_other_version(error.into()))
-    }
-
-    /// The trained model.
-    ///
-    /// # Errors
-    /// The training is not finished; the weights are damaged, or not those of the model that their config describes.
-    pub fn model(&self) -> Result<TrainedModel, TrainingError> {
-        let path = self.weights();
-        if !path.exists() {
-            return Err(TrainingError::NotFinished { path });
-        }
-        let saved = SavedWeights::read(&path)?;
-        let config = ExperimentConfig::parse(&saved.config, &path.display().to_string())
-            .map_err(|error| self.or_other_version(error.into()))?;
-        let mut parameters = Parameters::new();
-        let rng = Streams::new(config.seed).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = config.model.build(&mut init, &saved.standardisation)?;
-        saved.load_into(&mut parameters)?;
-        Ok(TrainedModel::new(
-            config.name,
-            network,
-            parameters,
-            saved.standardisation,
-            config.model.root_frame(),
-        ))
     }
 
     /// The file of the log.

@@ -119,8 +119,8 @@ impl<'d> Trainer<'d> {
         let transition = config.schedule.max_len.min(longest.unwrap_or(0));
         let views = dataset.train.iter().map(|clip| clip.features.view());
         let standardisation = root_frame.standardisation(views, transition);
-        if config.validation.is_some() && dataset.validation.is_empty() {
-            return Err(TrainingError::NoValidationClips);
+        if let Some(validation) = &config.validation {
+            validation.check(dataset)?;
         }
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());

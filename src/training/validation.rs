@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::Dataset;
+use super::TrainingError;
+use crate::data::{DanceClip, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
 use crate::models::TransitionModel;
 
@@ -32,6 +33,19 @@ impl Default for ValidationConfig {
 }
 
 impl ValidationConfig {
+    /// Refuses what could not be scored, before anything is trained.
+    ///
+    /// # Errors
+    /// No validation clips, or none with more frames than a length.
+    pub(super) fn check(&self, dataset: &Dataset) -> Result<(), TrainingError> {
+        let frames = dataset.validation.iter().map(DanceClip::frames);
+        let longest = frames.max().ok_or(TrainingError::NoValidationClips)?;
+        match self.lengths.iter().find(|&&length| length >= longest) {
+            Some(&length) => Err(TrainingError::ValidationLength { length, longest }),
+            None => Ok(()),
+        }
+    }
+
     /// Scores a model.
     ///
     /// # Errors

@@ -14,6 +14,7 @@ use clap::Args;
 use self::report::Reported;
 use self::results::RowResults;
 use self::rows::{Row, Seeds};
+use super::clip_choice::ClipChoice;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use super::train;
@@ -89,6 +90,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         ),
     };
     let dataset = dataset(&rows, &args.data)?;
+    ClipChoice::Test.of(&dataset)?;
     let workshop = Workshop {
         dataset: &dataset,
         out: &args.out,
@@ -168,6 +170,11 @@ impl Workshop<'_> {
         RowResults::of(row, self.out).read(row, self.dataset)?;
         let run = self.run_of(row);
         if !run.config_path().exists() {
+            // The model, the schedule and the validation are refused here, not when hours of other rows are over.
+            if row.is_trained() && !self.no_training {
+                Trainer::new(row.config.clone(), self.dataset, 1)
+                    .with_context(|| row.folder.clone())?;
+            }
             return Ok(());
         }
         let differences = run.config()?.differences(&row.config)?;

@@ -61,7 +61,8 @@ pub fn read(
 ) -> anyhow::Result<Vec<Row>> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
-        let config = ExperimentConfig::load_under(&file, budget, sets)?;
+        let config = ExperimentConfig::load_under(&file, budget, sets)
+            .with_context(|| format!("{} is no row", file.display()))?;
         if configs.iter().any(|other| other.name == config.name) {
             bail!(
                 "two configs in {} are called {}; give each a name of its own",
