@@ -64,6 +64,22 @@ fn gradcheck_compares_every_part_of_a_model_in_every_case() {
 }
 
 #[test]
+fn gradcheck_leaves_out_what_a_model_is_never_fed() {
+    let harvey = paper("harvey");
+    let arguments = [
+        "gradcheck",
+        &harvey,
+        "--per-parameter",
+        "1",
+        "--frames",
+        "2",
+    ];
+    let text = stdout(&run(&arguments));
+    assert!(text.contains("own predictions fed"), "{text}");
+    assert!(!text.contains("the truth fed"), "{text}");
+}
+
+#[test]
 fn gradcheck_says_when_there_is_nothing_to_check() {
     let output = run(&["gradcheck", &paper("interpolation")]);
     assert_eq!(output.status.code(), Some(1));

@@ -115,7 +115,7 @@ fn the_gradients_of_network_and_critics_are_those_of_central_differences_of_thei
                 seed: 1,
             };
             let model = ModelConfig::Harvey2020(config.small());
-            let report = check_model(&model, case, settings).unwrap();
+            let report = check_model(&model, case, settings).unwrap().unwrap();
             assert!(report.error() < 1e-5, "{case:?}: {report:?}");
             assert!(50 * report.kinks() <= report.compared(), "{case:?}");
             let critics = |name: &str| name.starts_with("critics.");

@@ -358,7 +358,7 @@ fn gradients_are_right(config: &Pan2021Config) {
             per_parameter: 2,
             seed: 2,
         };
-        let report = check_model(&model, case, settings).unwrap();
+        let report = check_model(&model, case, settings).unwrap().unwrap();
         let worst = report.parameters.iter().filter_map(|p| p.worst.as_ref());
         let worst = worst.max_by(|a, b| a.error.total_cmp(&b.error));
         assert!(report.error() < 1e-5, "{case:?}: {worst:?}");

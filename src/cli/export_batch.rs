@@ -56,6 +56,7 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
         true => Feed::GroundTruth,
         false => Feed::Predictions,
     };
+    let feed = network.feed(feed);
     let mut gradients = Gradients::zeros(parameters);
     let mut tape = Tape::recording(parameters, &mut workspace);
     let losses = network.losses(&mut tape, &batch, feed)?;
@@ -75,7 +76,7 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
         let entry = (array.shape().to_vec(), array.into_raw_vec_and_offset().0);
         entries.insert(name.into(), entry);
     }
-    let fed = f32::from(u8::from(args.ground_truth));
+    let fed = f32::from(u8::from(feed == Feed::GroundTruth));
     entries.insert("ground_truth_fed".into(), (vec![1], vec![fed]));
     replace_file(&args.out, &serialise(&entries)?)?;
     Ok(())

@@ -65,15 +65,21 @@ pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
         .par_iter()
         .map(|&case| check_model(&model, case, config))
         .collect::<Result<Vec<_>, _>>()?;
+    let reports: Vec<_> = cases
+        .iter()
+        .zip(reports)
+        .filter_map(|(case, report)| Some((case, report?)))
+        .collect();
     let mut out = std::io::stdout().lock();
-    for (case, report) in cases.iter().zip(&reports) {
+    for (case, report) in &reports {
         writeln!(out, "{}", title(case))?;
         write!(out, "{}", table(report))?;
         writeln!(out)?;
     }
-    let error = reports.iter().map(CheckReport::error).fold(0.0, f64::max);
-    let compared: usize = reports.iter().map(CheckReport::compared).sum();
-    let kinks: usize = reports.iter().map(CheckReport::kinks).sum();
+    let reports = || reports.iter().map(|(_, report)| report);
+    let error = reports().map(CheckReport::error).fold(0.0, f64::max);
+    let compared: usize = reports().map(CheckReport::compared).sum();
+    let kinks: usize = reports().map(CheckReport::kinks).sum();
     writeln!(
         out,
         "{compared} numbers compared, {kinks} at kinks left out; largest error {error:.1e}"

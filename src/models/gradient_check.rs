@@ -109,7 +109,7 @@ pub fn generated_windows(
 }
 
 /// Compares the gradient of a model's total loss with central differences: for critics of their own part of it, for all other
-/// weights of the rest (see [`super::LossTerms::critics`]).
+/// weights of the rest (see [`super::LossTerms::critics`]). None where the model is never fed as the case says.
 ///
 /// # Errors
 /// A model that is not trained, or whose settings do not fit together; nothing to check it on.
@@ -117,7 +117,7 @@ pub fn check_model(
     model: &ModelConfig,
     case: GradientCase,
     config: GradientCheckConfig,
-) -> Result<CheckReport, GradientCheckError> {
+) -> Result<Option<CheckReport>, GradientCheckError> {
     let (batch, standardisation) = generated_batch(case.transition, config.windows, config.seed)?;
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
     let mut parameters = Parameters::<f64>::new();
@@ -125,6 +125,9 @@ pub fn check_model(
         &mut Initialiser::new(&mut parameters, &mut rng),
         &standardisation,
     )?;
+    if network.feed(case.feed) != case.feed {
+        return Ok(None);
+    }
     for (_, value) in parameters.values_mut() {
         value.mapv_inplace(|x| x + rng.random_range(-NOISE..NOISE));
     }
@@ -154,5 +157,5 @@ pub fn check_model(
             })
         },
     )?;
-    Ok(report)
+    Ok(Some(report))
 }
