@@ -51,6 +51,26 @@ pub struct LossTerms {
     pub terms: Vec<(&'static str, Var)>,
 }
 
+impl LossTerms {
+    /// Terms by name with their weights in `total`, each `[1]`; `critics` as the field.
+    pub(super) fn weighted<T: Real>(
+        tape: &mut Tape<'_, T>,
+        terms: &[(&'static str, f64, Var)],
+        critics: Option<Var>,
+    ) -> Result<Self, AutogradError> {
+        let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
+        for &(_, weight, term) in terms {
+            let weighted = tape.affine(term, weight, 0.0);
+            total = tape.add(total, weighted)?;
+        }
+        Ok(Self {
+            total,
+            critics,
+            terms: terms.iter().map(|&(name, _, term)| (name, term)).collect(),
+        })
+    }
+}
+
 /// A trainable network; its weights live in the [`crate::autograd::Parameters`] that it was built with.
 pub trait Network<T: Real>: Send + Sync {
     /// Whether its batches need [`Batch::poses`].

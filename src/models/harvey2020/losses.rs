@@ -173,17 +173,5 @@ pub(super) fn terms<T: Real>(
         all.push(("critics", 1.0, judgement.critics));
         critics_part = Some(judgement.critics);
     }
-    let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
-    for &(_, weight, term) in &all {
-        let weighted = tape.affine(term, weight, 0.0);
-        total = tape.add(total, weighted)?;
-    }
-    Ok(LossTerms {
-        total,
-        critics: critics_part,
-        terms: all
-            .into_iter()
-            .map(|(name, _, term)| (name, term))
-            .collect(),
-    })
+    LossTerms::weighted(tape, &all, critics_part)
 }

@@ -74,19 +74,7 @@ pub(super) fn terms<T: Real>(
         let vfac = velocity_factor(tape, units, batch, velocities)?;
         all.push(("vfac", weights.vfac, tape.affine(vfac, mean, 0.0)));
     }
-    let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
-    for &(_, weight, term) in &all {
-        let weighted = tape.affine(term, weight, 0.0);
-        total = tape.add(total, weighted)?;
-    }
-    Ok(LossTerms {
-        total,
-        critics: None,
-        terms: all
-            .into_iter()
-            .map(|(name, _, term)| (name, term))
-            .collect(),
-    })
+    LossTerms::weighted(tape, &all, None)
 }
 
 /// The true numbers of frames k1 + 1 .. k2, `[rows, columns]`.
