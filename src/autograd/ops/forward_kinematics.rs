@@ -129,7 +129,8 @@ impl<T: Real> Tape<'_, T> {
                 world[4 * joint..4 * joint + 4].copy_from_slice(&rotation);
             }
         }
-        if !self.is_recording() {
+        // Without a gradient to take the operation is not kept.
+        if ![rotations, offsets].iter().any(|&input| self.needs_gradient(input)) {
             self.give(std::mem::take(&mut world));
         }
         let (inputs, shape) = ([rotations, offsets], [rows, 3 * joints]);
