@@ -30,8 +30,8 @@ pub struct EvaluateArgs {
     /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is the mean over these
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
     lengths: Vec<u16>,
-    /// Write the scores here, too; a run's folder gets them anyway, as evaluation.json (evaluation_validation.json,
-    /// evaluation_train.json)
+    /// Write the scores here, too; a run's folder gets those at the paper's lengths anyway, as evaluation.json
+    /// (evaluation_validation.json, evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
@@ -90,7 +90,10 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
-    if let Some(folder) = subject.folder(args.out.as_deref())? {
+    let own_lengths = subject.run.is_some() && !args.lengths.is_empty();
+    if let Some(folder) = subject.folder(args.out.as_deref())?
+        && !own_lengths
+    {
         record.write(folder)?;
     }
     Ok(())

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use crate::data::{DataConfig, DataRanges, Dataset};
+use crate::data::{DataRanges, Dataset};
 use crate::models::TransitionModel;
 use crate::training::{ExperimentConfig, RunFolder};
 
@@ -86,22 +86,21 @@ impl Subject {
     /// Refuses data that the run was not trained on: its training clips may be test clips there.
     ///
     /// # Errors
-    /// The config splits the data otherwise than the run's, or the data has another digest than the run's manifest says.
+    /// The config reads or splits the data otherwise than the run's, or the data has another digest than the run's manifest says.
     pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> anyhow::Result<()> {
         let Some(run) = &self.run else {
             return Ok(());
         };
         let trained = run.config()?.data;
-        let parts = |data: &DataConfig| (data.split.clone(), data.validation_share);
-        if parts(&trained) != parts(&self.config.data) {
+        if trained != self.config.data {
             let config = |data| ExperimentConfig {
                 data,
                 ..ExperimentConfig::default()
             };
             let differences = config(trained).differences(&config(self.config.data.clone()))?;
             anyhow::bail!(
-                "{} was trained on other clips of the data ({}; values there, values now), so some of these may be its training \
-                 clips; give --other-data to use it on them all the same",
+                "{} was trained on other clips or features of the data ({}; values there, values now), so some of these may be its \
+                 training clips; give --other-data to use it on them all the same",
                 run.path().display(),
                 differences.join("; ")
             );

@@ -187,6 +187,14 @@ impl ExperimentConfig {
         check("scheduled_sampling.decay", decay, is_share(decay), || {
             share.into()
         })?;
+        if let ModelConfig::Harvey2020(model) = &self.model {
+            let (own, data) = (model.facing_sigma, self.data.facing_sigma);
+            check("model.facing_sigma", own, own == data, || {
+                format!(
+                    "{data}, the value of data.facing_sigma: p^b is compared where both turn alike"
+                )
+            })?;
+        }
         let every = self.checkpoint.every_steps;
         check("checkpoint.every_steps", every, every > 0, || {
             "at least 1".into()
