@@ -16,14 +16,13 @@ pub enum Controllers {
     FullyConnected,
 }
 
-/// What the decoders' numbers of p^b, p^r and o^r are.
+/// What the decoders' numbers are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Output {
     /// The frame itself, as in the paper.
     Absolute,
-    /// What is added to a plain guess: p^b and o^r between those of the keyframes, linearly, p^r the given trajectory. So an untrained
-    /// network is near interpolation.
+    /// What is added to the best linear estimate from the keyframes, and to the given trajectory. So an untrained network is near these.
     Residual,
 }
 

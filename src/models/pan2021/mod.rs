@@ -3,6 +3,7 @@
 //! - `config`: sizes and ablations;
 //! - `controller`: root trajectory and velocity factor controllers (figure 3);
 //! - `network`: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
+//! - `guess`: what a residual network's numbers are added to;
 //! - `losses`: eq. 3 to 11;
 //! - `units`: from standardised numbers to centimetres on the tape.
 //!
@@ -10,6 +11,7 @@
 
 mod config;
 mod controller;
+mod guess;
 mod losses;
 mod network;
 mod units;

@@ -5,13 +5,14 @@ use rand::Rng;
 
 use super::config::{Output, Pan2021Config};
 use super::controller::{Controller, Session, Trajectory};
+use super::guess;
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::data::Standardisation;
 use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
 use crate::motion::features::{
-    BODY_POSITIONS, FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
+    BODY_POSITIONS, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
 use crate::nn::{Initialiser, Lstm, Mlp};
 
@@ -334,22 +335,38 @@ impl<T: Real> Rollout<'_, '_, T> {
         tape.concat(&parts)
     }
 
-    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b and o^r linearly between the keyframes, p^r of the
-    /// given trajectory; c, v^b and v^r 0, their means.
+    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`guess::weights`] estimates it, p^r of the given
+    /// trajectory, o^r linearly between the keyframes; v^b and v^r the differences of these p^b and p^r; c 0, their means.
     fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
-        let share = T::from_f64((t + 1) as f64 / self.transition as f64);
+        let (units, n) = (&self.network.units, self.transition);
+        let weights = [t, t + 1].map(|t| guess::weights(t, n).map(T::from_f64));
+        let share = T::from_f64((t + 1) as f64 / n as f64);
         let frame = |index: usize| {
             self.values[index * self.windows * FEATURES..(index + 1) * self.windows * FEATURES]
                 .chunks_exact(FEATURES)
         };
-        let given = frame(0).zip(frame(t + 1)).zip(frame(self.transition));
+        let ends = frame(0).zip(frame(n));
+        let given = frame(t).zip(frame(t + 1));
         tape.constant_with(&[self.windows, FRAME], |out| {
-            for (out, ((first, now), last)) in out.chunks_exact_mut(FRAME).zip(given) {
-                for column in BODY_POSITIONS.chain(FACING) {
-                    out[column] = first[column] + (last[column] - first[column]) * share;
+            for (out, ((first, last), (before, now))) in
+                out.chunks_exact_mut(FRAME).zip(ends.zip(given))
+            {
+                let places = out.split_at_mut(VELOCITIES.start);
+                let (places, velocities) = places;
+                for (column, velocity) in (0..).zip(velocities) {
+                    let speed = units.speed(column, first[VELOCITIES.start + column]);
+                    let [earlier, place] = match BODY_POSITIONS.contains(&column) {
+                        true => weights.map(|[x0, v0, xn]| {
+                            x0 * first[column] + v0 * speed + xn * last[column]
+                        }),
+                        false => [before[column], now[column]],
+                    };
+                    places[column] = place;
+                    *velocity = units.standardised_speed(column, place - earlier);
                 }
-                out[ROOT_POSITION].copy_from_slice(&now[ROOT_POSITION]);
-                out[FACING.end..].fill(T::zero());
+                let facing = FACING.start;
+                places[facing] = first[facing] + (last[facing] - first[facing]) * share;
+                places[CONTACTS].fill(T::zero());
             }
         })
     }

@@ -96,6 +96,27 @@ impl Units {
             .collect()
     }
 
+    /// A standardised velocity of p^b or p^r, `number` 0 to 71, in standard deviations of the position a frame.
+    pub(super) fn speed<T: Real>(&self, number: usize, standardised: T) -> T {
+        let [scale, offset] = self.speed_map(number);
+        (standardised - T::from_f64(offset)) / T::from_f64(scale)
+    }
+
+    /// The inverse of [`Units::speed`].
+    pub(super) fn standardised_speed<T: Real>(&self, number: usize, speed: T) -> T {
+        let [scale, offset] = self.speed_map(number);
+        speed * T::from_f64(scale) + T::from_f64(offset)
+    }
+
+    /// Scale and offset from position deviations a frame to a standardised velocity.
+    fn speed_map(&self, number: usize) -> [f64; 2] {
+        let std = self.velocity_std[number];
+        [
+            self.position_std[number] / std,
+            -self.velocity_mean[number] / std,
+        ]
+    }
+
     /// Velocities in cm/frame from standardised ones, `[.., 72]`.
     pub(super) fn velocities<T: Real>(
         &self,
