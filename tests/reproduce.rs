@@ -361,6 +361,23 @@ fn results_and_runs_of_another_budget_or_other_data_are_refused_with_both_sides(
 }
 
 #[test]
+fn rows_trained_at_the_same_time_end_as_one_after_the_other() {
+    let place = TempDir::new().unwrap();
+    let mut command = reproduce(place.path());
+    let done = command.args(["--jobs", "2", "--threads", "2"]).assert();
+    done.success().stderr(contains("whole_model: step "));
+    for row in ["whole_model", "one_lstm"] {
+        let before = weights(REPRODUCED.path(), row);
+        assert_eq!(weights(place.path(), row), before, "{row}");
+    }
+    for file in ["tables.md", "interpolation/evaluation.json"] {
+        let [there, here] = [REPRODUCED.path(), place.path()]
+            .map(|path| fs::read_to_string(path.join("results").join(file)).unwrap());
+        assert_eq!(there, here, "{file}");
+    }
+}
+
+#[test]
 fn rows_that_could_not_be_trained_are_refused_before_any_is() {
     let place = TempDir::new().unwrap();
     for (set, words) in [

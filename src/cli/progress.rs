@@ -13,6 +13,8 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 /// A bar on a terminal, a line now and then elsewhere.
 pub struct Progress {
     bar: Option<ProgressBar>,
+    /// What lines begin with.
+    name: String,
     steps: u64,
     frame_steps: u64,
     begun: Instant,
@@ -33,6 +35,15 @@ impl Progress {
         });
         Self {
             bar,
+            ..Self::lines(String::new(), schedule, before)
+        }
+    }
+
+    /// Lines that begin with a name, for a training that is not the only one; `before` as in [`Progress::new`].
+    pub fn lines(name: String, schedule: &Schedule, before: u64) -> Self {
+        Self {
+            bar: None,
+            name,
             steps: schedule.steps(),
             frame_steps: schedule.frame_steps(),
             begun: Instant::now(),
@@ -48,7 +59,8 @@ impl Progress {
         let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
         let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
         let what = format!(
-            "step {}/{}  N {}  loss {:.4}  {rate:.0} frames/s  {} left",
+            "{}step {}/{}  N {}  loss {:.4}  {rate:.0} frames/s  {} left",
+            self.name,
             report.step,
             self.steps,
             report.length,

@@ -32,6 +32,14 @@ impl Threads {
         }
     }
 
+    /// Those of one of `jobs` that run at the same time, at least one.
+    pub fn shared(self, jobs: u16) -> Self {
+        let threads = (self.count() / usize::from(jobs)).clamp(1, u16::MAX.into());
+        Self {
+            threads: Some(threads as u16),
+        }
+    }
+
     /// Threads for rayon.
     ///
     /// # Errors

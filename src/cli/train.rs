@@ -51,7 +51,8 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     } else {
         RunFolder::create(&args.out, &config)?
     };
-    match train(&mut trainer, &run, &Stop::on_signal()?)? {
+    let progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
+    match train(&mut trainer, &run, &Stop::on_signal()?, progress)? {
         Outcome::Finished => {
             writeln!(out, "{}", run.weights().display())?;
             writeln!(out, "weights {}", trainer.weights_digest())?;
@@ -66,7 +67,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Trains to the end or until asked to stop, and shows how far it has come.
+/// Trains to the end or until asked to stop, and shows on `progress` how far it has come.
 ///
 /// # Errors
 /// As [`Trainer::run`].
@@ -74,8 +75,8 @@ pub fn train(
     trainer: &mut Trainer<'_>,
     run: &RunFolder,
     stop: &Stop,
+    mut progress: Progress,
 ) -> Result<Outcome, TrainingError> {
-    let mut progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
     let outcome = trainer.run(Some(run), &mut |report| {
         progress.step(report);
         match stop.is_asked() {

@@ -7,6 +7,8 @@ mod rows;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
@@ -15,6 +17,7 @@ use self::report::Reported;
 use self::results::RowResults;
 use self::rows::{Row, Seeds};
 use super::clip_choice::ClipChoice;
+use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use super::train;
@@ -58,6 +61,9 @@ pub struct ReproduceArgs {
     /// Train nothing: evaluate the runs that are finished and write the tables
     #[arg(long)]
     no_training: bool,
+    /// Rows to train at the same time, the threads shared among them; no number in the result depends on it
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    jobs: u16,
     #[command(flatten)]
     threads: Threads,
 }
@@ -95,29 +101,34 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         dataset: &dataset,
         out: &args.out,
         runs: &runs,
-        threads: args.threads,
+        threads: args.threads.shared(args.jobs),
+        alone: args.jobs == 1,
         no_training: args.no_training,
         stop: Stop::on_signal()?,
     };
     for row in &rows {
         workshop.check(row)?;
     }
-    let mut diverged = None;
-    for (index, row) in chosen.iter().enumerate() {
-        let mut out = std::io::stdout();
-        writeln!(out, "== {} ({} of {})", row.folder, index + 1, chosen.len())?;
-        match workshop.finish(row)? {
-            RowOutcome::Done => workshop.report(&rows)?,
-            RowOutcome::Diverged(error) => {
-                eprintln!("error: {}: {error}", row.folder);
-                diverged = Some(error);
-            }
-            RowOutcome::Left => {}
-        }
-        if workshop.stop.is_asked() {
-            break;
-        }
-    }
+    let line = Line {
+        workshop: &workshop,
+        rows: &rows,
+        chosen: &chosen,
+        next: AtomicUsize::new(0),
+        diverged: Mutex::new(None),
+    };
+    std::thread::scope(|scope| {
+        let jobs = (0..args.jobs).map(|_| scope.spawn(|| line.work()));
+        // All begin before one is waited for.
+        let jobs: Vec<_> = jobs.collect();
+        jobs.into_iter().try_for_each(|job| match job.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        })
+    })?;
+    let diverged = line
+        .diverged
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
     workshop.report(&rows)?;
     if workshop.stop.is_asked() {
         eprintln!("stopped and saved; go on with\n  {}", same_command());
@@ -128,6 +139,53 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
     }
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Rows in a line, taken one after the other by the jobs.
+struct Line<'a> {
+    workshop: &'a Workshop<'a>,
+    rows: &'a [Row],
+    chosen: &'a [&'a Row],
+    /// The next of `chosen`; all are taken once a job has failed.
+    next: AtomicUsize,
+    /// The last training that diverged; held while the tables are written.
+    diverged: Mutex<Option<TrainingError>>,
+}
+
+impl Line<'_> {
+    /// Finishes row after row until none is left or the user asks to stop.
+    fn work(&self) -> anyhow::Result<()> {
+        while !self.workshop.stop.is_asked() {
+            let index = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(row) = self.chosen.get(index) else {
+                break;
+            };
+            let of = self.chosen.len();
+            writeln!(
+                std::io::stdout(),
+                "== {} ({} of {of})",
+                row.folder,
+                index + 1
+            )?;
+            let outcome = self.workshop.finish(row).and_then(|outcome| {
+                let mut diverged = self.diverged.lock().unwrap_or_else(PoisonError::into_inner);
+                match outcome {
+                    RowOutcome::Done => self.workshop.report(self.rows)?,
+                    RowOutcome::Diverged(error) => {
+                        eprintln!("error: {}: {error}", row.folder);
+                        *diverged = Some(error);
+                    }
+                    RowOutcome::Left => {}
+                }
+                Ok(())
+            });
+            if outcome.is_err() {
+                self.next.store(self.chosen.len(), Ordering::Relaxed);
+                return outcome;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The data set of all rows.
@@ -155,7 +213,10 @@ struct Workshop<'a> {
     dataset: &'a Dataset,
     out: &'a Path,
     runs: &'a Path,
+    /// Of one row.
     threads: Threads,
+    /// Whether there is one job only, which may draw bars on a terminal.
+    alone: bool,
     no_training: bool,
     stop: Stop,
 }
@@ -247,15 +308,21 @@ impl Workshop<'_> {
         train::describe(&trainer, threads)?;
         let path = self.runs.join(&row.folder);
         let run = train::resume(&mut trainer, &path, &row.config)?;
-        Ok(train::train(&mut trainer, &run, &self.stop)?)
+        let (schedule, before) = (trainer.schedule(), trainer.frame_steps_done());
+        let progress = match self.alone {
+            true => Progress::new(schedule, before),
+            false => Progress::lines(format!("{}: ", row.folder), schedule, before),
+        };
+        Ok(train::train(&mut trainer, &run, &self.stop, progress)?)
     }
 
     fn evaluate(&self, model: &dyn TransitionModel) -> anyhow::Result<Evaluation> {
         let protocol = Protocol::default();
-        let outcome = self
-            .threads
-            .pool()?
-            .install(|| evaluate_watched(&protocol, model, &self.dataset.test))?;
+        let clips = &self.dataset.test;
+        let outcome = self.threads.pool()?.install(|| match self.alone {
+            true => evaluate_watched(&protocol, model, clips),
+            false => protocol.evaluate(model, clips),
+        })?;
         for skipped in &outcome.skipped {
             eprintln!("warning: {skipped}");
         }
