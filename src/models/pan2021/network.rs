@@ -5,7 +5,7 @@ use rand::Rng;
 
 use super::config::{Output, Pan2021Config};
 use super::controller::{Controller, Session, Trajectory};
-use super::guess;
+use super::guess::Estimate;
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
@@ -312,8 +312,10 @@ impl<T: Real> Rollout<'_, '_, T> {
         match network.config.output {
             Output::Absolute => Ok(decoded),
             Output::Residual => {
+                let open = self.open(tape, t);
+                let scaled = tape.mul(decoded, open)?;
                 let guess = self.guess(tape, t);
-                tape.add(decoded, guess)
+                tape.add(scaled, guess)
             }
         }
     }
@@ -335,11 +337,22 @@ impl<T: Real> Rollout<'_, '_, T> {
         tape.concat(&parts)
     }
 
-    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`guess::weights`] estimates it, p^r of the given
+    /// What a residual is multiplied with in frame t + 1, `[149]`: what the estimate of p^b leaves open, of p^r and o^r the same share;
+    /// of the velocities what that of v^b does; 1 for c.
+    fn open(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
+        let estimate = Estimate::new(t + 1, self.transition);
+        tape.constant_with(&[FRAME], |out| {
+            out.fill(T::from_f64(estimate.deviation));
+            out[CONTACTS].fill(T::one());
+            out[VELOCITIES].fill(T::from_f64(estimate.step_deviation));
+        })
+    }
+
+    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`Estimate`] has it, p^r of the given
     /// trajectory, o^r linearly between the keyframes; v^b and v^r the differences of these p^b and p^r; c 0, their means.
     fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         let (units, n) = (&self.network.units, self.transition);
-        let weights = [t, t + 1].map(|t| guess::weights(t, n).map(T::from_f64));
+        let weights = [t, t + 1].map(|t| Estimate::new(t, n).weights.map(T::from_f64));
         let share = T::from_f64((t + 1) as f64 / n as f64);
         let frame = |index: usize| {
             self.values[index * self.windows * FEATURES..(index + 1) * self.windows * FEATURES]
