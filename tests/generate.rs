@@ -463,6 +463,11 @@ fn controls_that_cannot_be_used_are_named() {
         "nowhere.bvh cannot be read",
     );
     refused(with(&["--length", "0"]), "--length");
+    refused(with(&["--length", "60000"]), "frame 120000 of the result");
+    refused(
+        with(&["--length", "108000,108000"]),
+        "frame 216000 of the result",
+    );
     refused(
         with(&["--length", "10,20,30"]),
         "gives 3 numbers for the 2 transitions",

@@ -33,12 +33,12 @@ pub struct KeyframeArgs {
     mapping: Option<PathBuf>,
     /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such as 100,250
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion", conflicts_with = "keyframe",
-        value_parser = clap::value_parser!(u32).range(1..=LONGEST))]
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(LONGEST)))]
     length: Vec<u32>,
 }
 
 /// Frames of a result at most: an hour at 30 a second.
-const LONGEST: i64 = 108_000;
+const LONGEST: u32 = 108_000;
 
 /// One `--keyframe`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,7 +57,7 @@ fn parse_keyframe(text: &str) -> Result<KeyframeArg, String> {
         Some(KeyframeArg { file, frame, time })
     };
     let keyframe = parts().ok_or("expected FILE.bvh:FRAME@TIME with whole numbers from 0 on")?;
-    if keyframe.time as i64 > LONGEST {
+    if keyframe.time > LONGEST as usize {
         return Err(format!("TIME {} is beyond {LONGEST} frames", keyframe.time));
     }
     Ok(keyframe)
@@ -235,28 +235,29 @@ impl Keyframes {
             );
         }
         let request = request.like(clip, *first)?;
-        match args.length[..] {
-            [] => Ok(request),
-            [length] => Ok(request.with_length(length as usize)?),
-            _ => {
-                let lengths = args.length.iter().map(|&length| length as usize);
-                let times: Vec<usize> = [0]
-                    .into_iter()
-                    .chain(lengths.scan(0, |time, length| {
-                        *time += length;
-                        Some(*time)
-                    }))
-                    .collect();
-                request.at_times(&times).map_err(|error| match error {
-                    SynthesisError::Times { keyframes, times } => anyhow::anyhow!(
-                        "--length gives {} numbers for the {} transitions between {keyframes} keyframes; give one number, or one for each",
-                        times - 1,
-                        keyframes - 1
-                    ),
-                    other => other.into(),
-                })
-            }
+        let lengths = match args.length[..] {
+            [] => return Ok(request),
+            [length] => vec![length as usize; self.keyframes.len() - 1],
+            _ => args.length.iter().map(|&length| length as usize).collect(),
+        };
+        let mut times = vec![0];
+        for length in lengths {
+            times.push(times[times.len() - 1] + length);
         }
+        let end = times[times.len() - 1];
+        if end > LONGEST as usize {
+            bail!(
+                "--length puts the last keyframe at frame {end} of the result, beyond {LONGEST} frames; give smaller lengths"
+            );
+        }
+        request.at_times(&times).map_err(|error| match error {
+            SynthesisError::Times { keyframes, times } => anyhow::anyhow!(
+                "--length gives {} numbers for the {} transitions between {keyframes} keyframes; give one number, or one for each",
+                times - 1,
+                keyframes - 1
+            ),
+            other => other.into(),
+        })
     }
 }
 
@@ -281,6 +282,7 @@ mod tests {
             "a.bvh:1@x",
             ":1@2",
             "a.bvh:1@999999999",
+            "a.bvh:1@18446744073709551615",
         ] {
             assert!(parse_keyframe(bad).is_err(), "{bad}");
         }
