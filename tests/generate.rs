@@ -459,6 +459,10 @@ fn controls_that_cannot_be_used_are_named() {
         "has 180 frames, the result needs velocity factors of 121",
     );
     refused(
+        with(&["--velocity-from", &format!("{clip}:18446744073709551615")]),
+        "has 180 frames, the result needs velocity factors of 121",
+    );
+    refused(
         with(&["--velocity-from", "nowhere.bvh:3"]),
         "nowhere.bvh cannot be read",
     );

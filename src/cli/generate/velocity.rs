@@ -99,7 +99,7 @@ impl VelocityArgs {
                 _ => (PathBuf::from(source), 0),
             };
             let clip = keyframes.clip(&path)?;
-            if clip.frames() < first + frames {
+            if clip.frames().saturating_sub(first) < frames {
                 anyhow::bail!(
                     "{} has {} frames, the result needs velocity factors of {frames} from its frame {first} on; give a longer clip or an earlier frame",
                     path.display(),
