@@ -254,6 +254,46 @@ fn each_transition_starts_from_what_was_generated_before_it() {
     );
 }
 
+/// Interpolation that makes a whole turn too many on its first transition. Keeps what it was asked.
+#[derive(Default)]
+struct Spinning {
+    asked: Mutex<Vec<TransitionRequest>>,
+}
+
+impl TransitionModel for Spinning {
+    fn name(&self) -> &str {
+        "spinning"
+    }
+
+    fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
+        let mut asked = self.asked.lock().unwrap();
+        let mut transitions = Interpolation::default().transitions(requests)?;
+        if asked.is_empty() {
+            let frames = &mut transitions[0].frames;
+            let length = frames.nrows() as f64;
+            for (step, angle) in frames.column_mut(FACING.start).iter_mut().enumerate() {
+                *angle += TAU * (step + 1) as f64 / length;
+            }
+        }
+        asked.extend_from_slice(requests);
+        Ok(transitions)
+    }
+}
+
+#[test]
+fn a_turn_too_many_is_not_asked_back_in_the_next_transition() {
+    let clip = dance(3, 150);
+    let request = SequenceRequest::from_clip(&clip, &[10, 60, 140]).unwrap();
+    let model = Spinning::default();
+    synthesise(&model, &request, &PLAIN, "dance").unwrap();
+    let asked = model.asked.lock().unwrap();
+    let facing = |k: usize| request.keyframes[k].keyframe.features[FACING.start];
+    let (start, target) = (&asked[1].start.features, &asked[1].target.features);
+    assert!((start[FACING.start] - facing(1) - TAU).abs() < 1e-9);
+    let turn = target[FACING.start] - start[FACING.start];
+    assert!((turn - (facing(2) - facing(1))).abs() < 1e-9, "{turn}");
+}
+
 /// Gives back recorded frames, the root sliding to and fro under them.
 struct Sliding {
     frames: Array2<f64>,

@@ -1,5 +1,7 @@
 //! From a request to motion: one transition after another.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 use ndarray::{Array2, ArrayView1, Axis, concatenate, s};
 
@@ -115,7 +117,11 @@ pub fn synthesise(
             request.keyframes[index - 1].time,
             request.keyframes[index].time,
         );
-        let asked = request.transition(index, motion.last());
+        let mut asked = request.transition(index, motion.last());
+        // A model that has made a turn too many or too few is not asked for it back: the target counts its turns from there.
+        let before = &request.keyframes[index - 1].keyframe;
+        let turned = asked.start.features[FACING.start] - before.features[FACING.start];
+        asked.target.features[FACING.start] += (turned / TAU).round() * TAU;
         let mut transitions =
             model
                 .transitions(std::slice::from_ref(&asked))
