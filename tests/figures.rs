@@ -209,6 +209,23 @@ fn asked_for_changes_are_what_the_figures_say() {
     let lengths = values("trained", "figure_10", "velocity_factor_share_of_asked");
     let rows: Vec<&str> = lengths.iter().map(|(row, ..)| row.as_str()).collect();
     assert_eq!(rows, ["N = 100", "N = 150", "N = 200", "N = 250"]);
+    for half in ["", "_second_half"] {
+        let [shares, asked, given] = [
+            "velocity_factor_share_of_asked",
+            "velocity_factor_mean_asked",
+            "velocity_factor_mean",
+        ]
+        .map(|measure| values("trained", "figure_10", &format!("{measure}{half}")));
+        for (row, _, share) in &shares {
+            let sum = |of: &[(String, String, f64)]| -> f64 {
+                let of_row = of.iter().filter(|(name, ..)| name == row);
+                of_row.map(|(.., value)| value).sum()
+            };
+            // Both over the same frames; the file has four decimals.
+            let expected = sum(&given) / sum(&asked);
+            assert!((share - expected).abs() < 1e-3, "{row}{half}: {share}");
+        }
+    }
     let pairs = values("trained", "figure_7", "body_distance");
     assert_eq!(pairs.len(), 6, "all pairs of four trajectories");
 }

@@ -3,11 +3,10 @@
 use super::output::{Figure, Numbers};
 use super::root::mean_body_distance;
 use super::stage::{Generated, Stage};
-use super::velocity::{asked, mean_parts};
+use super::velocity::{asked_after, mean_parts};
 use super::wording::{mean, percent};
 use crate::evaluation::{FOLLOWED, mean_velocity_factors};
 use crate::models::TransitionModel;
-use crate::motion::PARTS;
 use crate::report::{MotionFigure, MotionRow, Placing, Shown};
 use ndarray::s;
 
@@ -32,26 +31,28 @@ pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<F
             generated[0].drawn(),
             true,
         ));
-        let [whole, second] = [0, length / 2].map(|from| {
-            mean_parts(&generated, |generated| {
+        let mut share = |from: usize, asked: &'static str, found: &'static str| {
+            let wanted = mean_parts(&generated, |generated| {
+                asked_after(&generated.request, from)
+            });
+            let measured = mean_parts(&generated, |generated| {
                 mean_velocity_factors(generated.frames.slice(s![from.., ..]))
-            })
-        });
-        let wanted = mean_parts(&generated, |generated| asked(&generated.request));
-        let share = |of: [f64; PARTS]| mean(&of) / mean(&wanted);
-        numbers.add_parts(&label, "velocity_factor_mean_asked", wanted, "cm/frame");
-        numbers.add_parts(&label, "velocity_factor_mean", whole, "cm/frame");
-        numbers.add_parts(
-            &label,
+            });
+            numbers.add_parts(&label, asked, wanted, "cm/frame");
+            numbers.add_parts(&label, found, measured, "cm/frame");
+            mean(&measured) / mean(&wanted)
+        };
+        let whole = share(0, "velocity_factor_mean_asked", "velocity_factor_mean");
+        let second = share(
+            length / 2,
+            "velocity_factor_mean_asked_second_half",
             "velocity_factor_mean_second_half",
-            second,
-            "cm/frame",
         );
-        numbers.add(&label, "velocity_factor_share_of_asked", share(whole), "");
+        numbers.add(&label, "velocity_factor_share_of_asked", whole, "");
         numbers.add(
             &label,
             "velocity_factor_share_of_asked_second_half",
-            share(second),
+            second,
             "",
         );
         if let Some(first) = results.first() {
@@ -59,8 +60,8 @@ pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<F
             numbers.add(&label, "body_distance_from_N_100", distance, "cm");
             said.push(format!("{distance:.1} cm at {length}"));
         }
-        if share(second) < FOLLOWED {
-            stalled.push((length, share(second)));
+        if second < FOLLOWED {
+            stalled.push((length, second));
         }
         results.push(generated);
     }

@@ -10,6 +10,7 @@ use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line, Scale};
 use crate::report::{MotionFigure, MotionRow, Placing, Shown};
 use crate::synthesis::{SequenceRequest, SynthesisOptions, synthesise};
+use ndarray::s;
 
 /// Frames from one drawn dancer to the next, as in the paper.
 const EVERY: usize = 5;
@@ -194,12 +195,14 @@ fn row(label: &str, generated: &Generated) -> MotionRow {
 }
 
 /// Mean velocity factors that were asked for in the predicted frames, cm/frame.
-pub fn asked(request: &SequenceRequest) -> [f64; PARTS] {
-    let factors = &request.velocity_factors;
-    std::array::from_fn(|part| {
-        let column: Vec<f64> = factors.column(part).iter().skip(1).copied().collect();
-        mean(&column)
-    })
+fn asked(request: &SequenceRequest) -> [f64; PARTS] {
+    asked_after(request, 0)
+}
+
+/// The same in the frames after frame `from`.
+pub fn asked_after(request: &SequenceRequest, from: usize) -> [f64; PARTS] {
+    let factors = request.velocity_factors.slice(s![from + 1.., ..]);
+    std::array::from_fn(|part| mean(&factors.column(part).to_vec()))
 }
 
 /// Mean over the windows of one number a part.
