@@ -27,6 +27,8 @@ const FIGURES: [&str; 9] = [
 ];
 const INTERPOLATION: &str =
     "name = 'interpolation'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'interpolation'\n";
+const ZERO_VELOCITY: &str =
+    "name = 'zero_velocity'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'zero_velocity'\n";
 const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
     [model]\nkind = 'pan2021'\nhidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n\
     [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n";
@@ -334,6 +336,31 @@ fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
     let page = generate(&["--length", "50"]);
     assert_eq!(names(&page), 2);
     assert!(page.contains(r#""frames":101,"#));
+}
+
+#[test]
+fn interpolation_stands_beside_the_other_models_without_training_too() {
+    fs::write(FIXTURE.path("zero_velocity.toml"), ZERO_VELOCITY).unwrap();
+    FIXTURE
+        .figures("zero_velocity.toml", "still")
+        .assert()
+        .success();
+    let rows = values("still", "figure_12", "LRP");
+    let rows: Vec<&str> = rows.iter().map(|(row, ..)| row.as_str()).collect();
+    assert_eq!(rows, ["Interpolation", "zero_velocity"]);
+    let page = FIXTURE.path("still.html");
+    keydance("generate")
+        .arg(FIXTURE.path("zero_velocity.toml"))
+        .arg("--motion")
+        .arg(first_clip(&FIXTURE.path("data")))
+        .args(["--keyframes", "20,60", "--out"])
+        .arg(FIXTURE.path("still.bvh"))
+        .arg("--viewer")
+        .arg(&page)
+        .assert()
+        .success();
+    let page = fs::read_to_string(page).unwrap();
+    assert!(page.contains(r#""name":"Interpolation""#));
 }
 
 fn first_clip(folder: &Path) -> PathBuf {

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context as _;
 
 use crate::data::{DataRanges, Dataset};
-use crate::models::TransitionModel;
+use crate::models::{ModelConfig, TransitionModel};
 use crate::training::{ExperimentConfig, RunFolder};
 
 pub struct Subject {
@@ -81,6 +81,11 @@ impl Subject {
             run: Some(run),
             ranges,
         })
+    }
+
+    /// Whether the model is interpolation, which other models are shown beside.
+    pub fn is_interpolation(&self) -> bool {
+        matches!(self.config.model, ModelConfig::Interpolation(_))
     }
 
     /// Refuses data that the run was not trained on: its training clips may be test clips there.

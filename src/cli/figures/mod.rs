@@ -155,21 +155,19 @@ impl Cast {
 
     /// Name, whether it was trained, and model: interpolation unless it is among those given, the others, the figures' own.
     fn models(&self) -> Vec<(&str, bool, &dyn TransitionModel)> {
-        let trained = |subject: &Subject| subject.ranges.is_some();
-        let given: Vec<_> = self
-            .compared
-            .iter()
-            .chain([&self.subject])
-            .map(|subject| {
-                let model = subject.model.as_ref();
-                (subject.config.name.as_str(), trained(subject), model)
-            })
-            .collect();
+        let given = || self.compared.iter().chain([&self.subject]);
         let mut models: Vec<(&str, bool, &dyn TransitionModel)> = Vec::new();
-        if given.iter().all(|(_, trained, _)| *trained) {
+        if !given().any(Subject::is_interpolation) {
             models.push(("Interpolation", false, &self.interpolation));
         }
-        models.extend(given);
+        models.extend(given().map(|subject| {
+            let trained = subject.ranges.is_some();
+            (
+                subject.config.name.as_str(),
+                trained,
+                subject.model.as_ref(),
+            )
+        }));
         models
     }
 

@@ -91,7 +91,7 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The viewer's page: the recorded motion where it runs along, interpolation under the same controls beside a trained model, what was generated.
+/// The viewer's page: the recorded motion where it runs along, interpolation under the same controls beside any other model, what was generated.
 fn page(
     subject: &Subject,
     keyframes: &Keyframes,
@@ -103,10 +103,9 @@ fn page(
         contact_threshold: subject.config.data.contact_threshold,
     };
     let name = "Interpolation";
-    // Not beside itself.
-    let interpolated = match subject.ranges {
-        Some(_) => Some(synthesise(&interpolation, request, options, name)?),
-        None => None,
+    let interpolated = match subject.is_interpolation() {
+        false => Some(synthesise(&interpolation, request, options, name)?),
+        true => None,
     };
     let mut shown = Vec::new();
     if let Some(frames) = keyframes.recorded(request) {
