@@ -216,12 +216,20 @@ fn hands_move_at_other_speeds_than_feet() {
 }
 
 #[test]
-fn configurations_that_ask_for_nothing_are_refused() {
+fn configurations_that_ask_for_nothing_or_too_much_are_refused() {
     let none = ChoreographyConfig {
         clips: 0,
         ..ChoreographyConfig::default()
     };
     assert_eq!(generate(&none), Err(ChoreographyError::NoClips));
+    for clips in [1001, usize::MAX] {
+        let config = ChoreographyConfig {
+            clips,
+            ..Default::default()
+        };
+        let error = Err(ChoreographyError::TooManyClips { clips });
+        assert_eq!(generate(&config), error);
+    }
     for frames in [0, 1, usize::MAX] {
         let config = ChoreographyConfig {
             frames_per_clip: frames,

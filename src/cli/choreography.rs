@@ -26,7 +26,7 @@ pub struct ChoreographyArgs {
 }
 
 /// # Errors
-/// No clips or frames are asked for, or a file cannot be written.
+/// No clips or frames or too many are asked for, or a file cannot be written.
 pub fn run(args: ChoreographyArgs) -> anyhow::Result<()> {
     let config = ChoreographyConfig {
         clips: args.clips,

@@ -34,6 +34,9 @@ const FEWEST_FRAMES: usize = 2;
 /// Most frames of a clip (about nine hours).
 const MOST_FRAMES: usize = 1_000_000;
 
+/// Most clips, each held in memory until all are made.
+const MOST_CLIPS: usize = 1000;
+
 /// Distance (cm) from the middle of the floor at which a dancer turns back.
 const FARTHEST: f64 = 120.0;
 
@@ -64,6 +67,8 @@ impl Default for ChoreographyConfig {
 pub enum ChoreographyError {
     #[error("choreography: `clips` is 0; ask for at least one clip")]
     NoClips,
+    #[error("choreography: `clips` is {clips}; it must be at most {MOST_CLIPS}")]
+    TooManyClips { clips: usize },
     #[error(
         "choreography: `frames_per_clip` is {frames}; it must be between {FEWEST_FRAMES} and {MOST_FRAMES}"
     )]
@@ -83,10 +88,15 @@ pub struct GeneratedClip {
 /// Generates the clips of a configuration.
 ///
 /// # Errors
-/// [`ChoreographyError`] where no clip is asked for, or clips shorter or longer than what can be made.
+/// [`ChoreographyError`] where no clip or more than 1000 are asked for, or clips shorter or longer than what can be made.
 pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, ChoreographyError> {
     if config.clips == 0 {
         return Err(ChoreographyError::NoClips);
+    }
+    if config.clips > MOST_CLIPS {
+        return Err(ChoreographyError::TooManyClips {
+            clips: config.clips,
+        });
     }
     if !(FEWEST_FRAMES..=MOST_FRAMES).contains(&config.frames_per_clip) {
         return Err(ChoreographyError::Frames {
