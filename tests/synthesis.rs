@@ -560,6 +560,26 @@ fn keyframes_of_other_clips_come_onto_the_first_dancers_bones() {
 }
 
 #[test]
+fn a_dancer_is_scaled_by_the_bones_of_the_keyframe_where_those_at_rest_are_others() {
+    let first = dance(10, 60);
+    let mut other = dance(11, 60);
+    // Twice as tall at rest, 1.2 times as tall in every frame.
+    for joint in &mut other.clip.skeleton.joints {
+        joint.offset *= 2.0;
+    }
+    for pose in &mut other.clip.poses {
+        pose.translations.iter_mut().for_each(|place| *place *= 1.2);
+    }
+    let height = other.clip.poses[40].translations[0].y;
+    let other = DanceClip::new(other.clip, None, &DataConfig::default()).unwrap();
+    let source = |clip, frame, time| KeyframeSource { clip, frame, time };
+    let request =
+        SequenceRequest::from_keyframes(&[source(&first, 5, 0), source(&other, 40, 50)]).unwrap();
+    let root = request.keyframes[1].keyframe.pose.translations[0];
+    assert!((root.y - height / 1.2).abs() < 1e-6, "{root}");
+}
+
+#[test]
 fn requests_that_do_not_fit_together_are_errors() {
     let clip = dance(12, 60);
     let error = |frames: &[usize]| {

@@ -81,12 +81,8 @@ impl SequenceRequest {
             let keyframe = if source.clip.clip.skeleton == dancer.skeleton {
                 with_constant_bones(keyframe, &skeleton)?
             } else {
-                retarget(
-                    keyframe,
-                    &source.clip.clip.skeleton,
-                    &skeleton,
-                    &source.clip.name,
-                )?
+                let bones = bones_of(&source.clip.clip.skeleton, &keyframe.pose);
+                retarget(keyframe, &bones, &skeleton, &source.clip.name)?
             };
             let time = source.time;
             keyframes.push(TimedKeyframe { time, keyframe });
