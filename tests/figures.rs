@@ -332,7 +332,10 @@ fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
     let page = generate(&[]);
     assert_eq!(names(&page), 3);
     assert!(page.contains(r#""frames":91,"#) && page.contains("3 keyframes"));
-    // At other distances the recorded motion does not run along.
+    // Where a keyframe is not its own, the recorded motion does not run along.
+    let foreign = format!("{}:5@30", clip.display());
+    assert_eq!(names(&generate(&["--keyframe", &foreign])), 2);
+    // At other distances neither.
     let page = generate(&["--length", "50"]);
     assert_eq!(names(&page), 2);
     assert!(page.contains(r#""frames":101,"#));

@@ -192,14 +192,20 @@ impl Keyframes {
         Some(&self.sources[path].clip)
     }
 
-    /// What `--motion` has in the frames of a request, `[F, 154]`; none where the request's keyframes stand at other distances.
+    /// What `--motion` has in the frames of a request, `[F, 154]`; none where the request has other keyframes than its, or has them at other
+    /// distances.
     pub fn recorded(&self, request: &SequenceRequest) -> Option<ArrayView2<'_, f64>> {
         let (path, first) = self.motion.as_ref()?;
+        let its_own = |keyframe: &KeyframeArg| {
+            keyframe.file == *path && keyframe.frame == first + keyframe.time
+        };
         let times = self.keyframes.iter().map(|keyframe| keyframe.time);
         let frames = *first..*first + request.frames();
         let clip = &self.sources[path].clip;
-        (times.eq(request.times()) && frames.end <= clip.frames())
-            .then(|| clip.features.slice(s![frames, ..]))
+        let runs_along = self.keyframes.iter().all(its_own)
+            && times.eq(request.times())
+            && frames.end <= clip.frames();
+        runs_along.then(|| clip.features.slice(s![frames, ..]))
     }
 
     /// The channels of the first keyframe's file, where they can hold the result.
