@@ -67,11 +67,19 @@ function drawFloor(view) {
 
 /** A path on the floor: faint as a whole, strong up to the present. */
 function drawPath(view, places, frame, colour, dash) {
-  const onFloor = (place) => view.project(place[0], floor + 0.5, place[2]);
-  const points = places.map(onFloor).filter((point) => point[2] > 10);
-  const line = (until) => {
+  const onFloor = (place) => [place[0], floor + 0.5, place[2]];
+  const line = (last) => {
     scene.beginPath();
-    points.slice(0, until).forEach(([x, y], index) => (index ? scene.lineTo(x, y) : scene.moveTo(x, y)));
+    let [x, y] = [];
+    for (let index = 1; index <= last; index++) {
+      const seen = view.segment(onFloor(places[index - 1]), onFloor(places[index]));
+      if (!seen) continue;
+      const [from, to] = seen;
+      // Only where the line before ends elsewhere: dashes begin anew at each start.
+      if (from[0] !== x || from[1] !== y) scene.moveTo(from[0], from[1]);
+      scene.lineTo(to[0], to[1]);
+      [x, y] = to;
+    }
     scene.stroke();
   };
   scene.save();
@@ -80,10 +88,10 @@ function drawPath(view, places, frame, colour, dash) {
   scene.setLineDash(dash);
   scene.lineWidth = 1.6;
   scene.globalAlpha = 0.4;
-  line(points.length);
+  line(places.length - 1);
   scene.globalAlpha = 1;
   scene.lineWidth = 2.6;
-  line(Math.floor(frame) + 1);
+  line(Math.floor(frame));
   scene.restore();
 }
 
