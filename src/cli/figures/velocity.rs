@@ -166,7 +166,7 @@ pub fn figure_9(
         .collect();
     let others: Vec<f64> = (0..PARTS)
         .filter(|part| !marked[*part])
-        .map(|part| gained[part])
+        .map(|part| gained[part].abs())
         .collect();
     let caption = format!(
         "Figure 9. One transition, (b) with the velocity factors of right arm and left leg (blue) times 1.5, every {EVERY} frames: {}, of the change asked for {}, \
