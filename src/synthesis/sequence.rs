@@ -52,7 +52,8 @@ pub struct Sequence {
     pub clip: Clip,
     /// Frames of the keyframes.
     pub keyframes: Vec<usize>,
-    /// Features of `clip`, `[F, 149]`: p^b, p^r, o^r, v^b, v^r measured on it, c as predicted (0 to 1, clamped).
+    /// Features of `clip`, `[F, 149]`: o^r is the predicted angle, bent onto the keyframes; p^b (turned by it), p^r, v^b and v^r are measured on
+    /// the poses; c is as predicted (0 to 1, clamped).
     pub features: Array2<f64>,
     /// What the model predicted, before anything was done to it, `[F, 149]`; row 0 is the first keyframe.
     pub predicted: Array2<f64>,

@@ -16,7 +16,7 @@ function forgetStrips() {
 const timeX = (frame, width) => INSET + (frame / Math.max(LAST, 1)) * (width - 2 * INSET);
 const frameAt = (x, width) => ((x - INSET) / (width - 2 * INSET)) * LAST;
 
-/** The series of a body part: what was asked for, then each shown motion that was not recorded for the asking. */
+/** The series of a body part: each shown motion, then what was asked for, if anything. */
 function seriesOf(part) {
   const column = (factors) => factors.map((frame) => frame[part]);
   const measured = motions.filter((motion) => motion.shown).map((motion) => ({ name: motion.name, hue: motion.hue, values: column(motion.factors) }));

@@ -10,7 +10,8 @@ const STEPS: usize = 64;
 pub enum Speed {
     /// The same all the way.
     Constant,
-    /// In proportion to these speeds, one for each step from a frame to the next (cm/frame or any other unit); all zero counts as constant.
+    /// In proportion to these speeds, one for each step from a frame to the next (cm/frame or any other unit). All
+    /// zero counts as constant, and so does another number of them.
     Like(Vec<f64>),
 }
 
