@@ -109,7 +109,7 @@ impl fmt::Display for ControlWarning {
             ),
             Self::Length { from, to } => write!(
                 f,
-                "the transition from frame {from} to {to} has {} frames; beyond {LONGEST} dances repeat themselves",
+                "the transition from frame {from} to {to} has {} frames, longer than the paper's longest, {LONGEST}",
                 to - from
             ),
             Self::Moved { time, distance } => write!(
@@ -120,7 +120,7 @@ impl fmt::Display for ControlWarning {
     }
 }
 
-/// What a model trained on data with these ranges has not seen, and transitions that are longer than any sense: one warning a kind.
+/// What a model trained on data with these ranges has not seen, and transitions longer than the paper's: one warning a kind.
 pub fn control_warnings(
     request: &SequenceRequest,
     ranges: Option<&DataRanges>,
