@@ -435,6 +435,10 @@ fn controls_that_cannot_be_used_are_named() {
     refused(with(&["--timing", "clip"]), "--trajectory-through");
     refused(with(&["--scale", "0"]), "expected a positive number");
     refused(with(&["--turn", "nan"]), "--turn");
+    refused(
+        with(&["--turn", "-200000"]),
+        "--turn -200000: expected a number between -100000 and 100000",
+    );
     refused(with(&["--raise", "inf"]), "--raise");
     refused(
         with(&["--velocity", "head=2"]),

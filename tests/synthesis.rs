@@ -593,17 +593,17 @@ fn requests_that_do_not_fit_together_are_errors() {
     assert!(error(&[10, 5]).contains("frame 5 follows one at frame 10"));
     assert!(error(&[10, 60]).contains("has no frame 60: its frames are 0 to 59"));
     let request = SequenceRequest::from_clip(&clip, &[0, 20]).unwrap();
-    assert!(
-        request
-            .clone()
-            .on_trajectory(Array2::zeros((20, 3)))
-            .is_err()
+    let trajectory = request.clone().on_trajectory(Array2::zeros((20, 3)));
+    assert_eq!(
+        trajectory.unwrap_err().to_string(),
+        "the root trajectory has 20 rows of 3 numbers; expected 21 rows, one a frame, of 3"
     );
-    assert!(
-        request
-            .clone()
-            .with_velocity_factors(Array2::zeros((21, 4)))
-            .is_err()
+    let factors = request
+        .clone()
+        .with_velocity_factors(Array2::zeros((21, 4)));
+    assert_eq!(
+        factors.unwrap_err().to_string(),
+        "the array of velocity factors has 21 rows of 4 numbers; expected 21 rows, one a frame, of 5"
     );
     assert!(request.clone().scaled(0.0).is_err());
     assert!(request.velocity_times([-1.0; 5]).is_err());

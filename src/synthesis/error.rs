@@ -23,11 +23,15 @@ pub enum SynthesisError {
         last: usize,
         fps: f64,
     },
-    #[error("{what} has {found} rows, the sequence has {expected} frames")]
-    Rows {
+    /// Shapes are `(rows, columns)`.
+    #[error(
+        "{what} has {} rows of {} numbers; expected {} rows, one a frame, of {}",
+        found.0, found.1, expected.0, expected.1
+    )]
+    Shape {
         what: &'static str,
-        found: usize,
-        expected: usize,
+        found: (usize, usize),
+        expected: (usize, usize),
     },
     #[error("{keyframes} keyframes got {times} times")]
     Times { keyframes: usize, times: usize },

@@ -153,27 +153,17 @@ impl SequenceRequest {
     /// Checks that the parts fit together; what concerns single transitions is checked by [`TransitionRequest::check`].
     ///
     /// # Errors
-    /// Fewer than two keyframes, times that do not ascend from 0, controls with another number of rows than F.
+    /// Fewer than two keyframes, times that do not ascend from 0, controls of another shape than `[F, 3]` and `[F, 5]`.
     pub fn check(&self) -> Result<(), SynthesisError> {
         let times = self.times();
         check_times(&times)?;
-        let expected = self.frames();
-        for (what, found) in [
-            ("the root trajectory", self.root_trajectory.nrows()),
-            (
-                "the array of velocity factors",
-                self.velocity_factors.nrows(),
-            ),
-        ] {
-            if found != expected {
-                return Err(SynthesisError::Rows {
-                    what,
-                    found,
-                    expected,
-                });
-            }
-        }
-        Ok(())
+        let frames = self.frames();
+        check_shape("the root trajectory", &self.root_trajectory, (frames, 3))?;
+        check_shape(
+            "the array of velocity factors",
+            &self.velocity_factors,
+            (frames, PARTS),
+        )
     }
 
     /// The request for the transition to keyframe `index` (from 1 on) that starts from `start`, which stands at the keyframe before.
@@ -205,6 +195,24 @@ pub(super) fn check_times(times: &[usize]) -> Result<(), SynthesisError> {
         }
     }
     Ok(())
+}
+
+/// A control has the shape `(rows, columns)`.
+pub(super) fn check_shape(
+    what: &'static str,
+    control: &Array2<f64>,
+    expected: (usize, usize),
+) -> Result<(), SynthesisError> {
+    let found = control.dim();
+    if found == expected {
+        Ok(())
+    } else {
+        Err(SynthesisError::Shape {
+            what,
+            found,
+            expected,
+        })
+    }
 }
 
 /// A frame of a clip as a keyframe: its features and its pose.

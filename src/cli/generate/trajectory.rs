@@ -61,7 +61,7 @@ impl TrajectoryArgs {
         ] {
             if value.is_some_and(|value| value.is_nan() || value.abs() > 1e5) {
                 anyhow::bail!(
-                    "--{flag} {}: expected a number of at most 100000",
+                    "--{flag} {}: expected a number between -100000 and 100000",
                     value.unwrap_or(0.0)
                 );
             }

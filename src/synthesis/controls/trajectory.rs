@@ -7,6 +7,7 @@ use ndarray::{Array2, s};
 
 use super::{rows_of, vector};
 use crate::motion::features::{FACING, ROOT_VELOCITY};
+use crate::synthesis::request::check_shape;
 use crate::synthesis::retarget::move_root;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
@@ -20,13 +21,7 @@ impl SequenceRequest {
         mut self,
         trajectory: Array2<f64>,
     ) -> Result<(Self, Vec<f64>), SynthesisError> {
-        if trajectory.dim() != (self.frames(), 3) {
-            return Err(SynthesisError::Rows {
-                what: "the root trajectory",
-                found: trajectory.nrows(),
-                expected: self.frames(),
-            });
-        }
+        check_shape("the root trajectory", &trajectory, (self.frames(), 3))?;
         self.root_trajectory = trajectory;
         let mut moved = Vec::with_capacity(self.keyframes.len());
         for timed in &mut self.keyframes {

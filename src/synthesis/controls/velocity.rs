@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use crate::motion::PARTS;
 use crate::motion::features::VELOCITY_FACTORS;
+use crate::synthesis::request::check_shape;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 impl SequenceRequest {
@@ -12,13 +13,8 @@ impl SequenceRequest {
     /// # Errors
     /// Another number of rows than F, or of columns than parts.
     pub fn with_velocity_factors(mut self, factors: Array2<f64>) -> Result<Self, SynthesisError> {
-        if factors.dim() != (self.frames(), PARTS) {
-            return Err(SynthesisError::Rows {
-                what: "the array of velocity factors",
-                found: factors.nrows(),
-                expected: self.frames(),
-            });
-        }
+        let expected = (self.frames(), PARTS);
+        check_shape("the array of velocity factors", &factors, expected)?;
         self.velocity_factors = factors;
         Ok(self)
     }
