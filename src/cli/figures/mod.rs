@@ -9,7 +9,7 @@ mod velocity;
 mod wording;
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -66,7 +66,7 @@ pub struct FiguresArgs {
 }
 
 /// # Errors
-/// A run or the data cannot be used, or do not fit each other; nothing is written then. A file cannot be written.
+/// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &[])?;
     let compared: Vec<Subject> = args
@@ -93,6 +93,10 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     )?;
     let cast = Cast::new(subject, compared);
     let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
+    let page = match &args.viewer {
+        Some(_) => Some(cast.page(&stage)?),
+        None => None,
+    };
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{} cannot be created", args.out.display()))?;
     for figure in &figures {
@@ -108,8 +112,8 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         &args.out.join("index.md"),
         index(&figures, &about).as_bytes(),
     )?;
-    if let Some(path) = &args.viewer {
-        cast.write_viewer(&stage, path)?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+        replace_file(path, page.as_bytes())?;
     }
     let mut out = std::io::stdout();
     for figure in &figures {
@@ -197,8 +201,8 @@ impl Cast {
         ])
     }
 
-    /// The shown transition in the viewer, as `keydance generate` would make it.
-    fn write_viewer(&self, stage: &Stage, path: &Path) -> anyhow::Result<()> {
+    /// The viewer's page of the shown transition, as `keydance generate` would make it.
+    fn page(&self, stage: &Stage) -> anyhow::Result<String> {
         let window = stage.shown();
         let options = SynthesisOptions::default();
         let mut sequences = Vec::new();
@@ -222,7 +226,6 @@ impl Cast {
                 frames: sequence.features.view(),
             });
         }
-        let page = viewer_page(&window.describe(), &window.request, &shown)?;
-        Ok(replace_file(path, page.as_bytes())?)
+        Ok(viewer_page(&window.describe(), &window.request, &shown)?)
     }
 }
