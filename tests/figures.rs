@@ -305,6 +305,26 @@ fn other_data_is_refused_unless_it_is_asked_for() {
 }
 
 #[test]
+fn the_caption_of_figure_5_says_how_many_clips_it_shows() {
+    let caption = caption("plain", "figure_5");
+    assert!(caption.contains("for two test clips"), "{caption}");
+    // Of five clips four train.
+    let data = TempDir::new().unwrap();
+    write_clips(data.path(), 80, 3);
+    fs::remove_file(first_clip(data.path())).unwrap();
+    keydance("figures")
+        .arg(FIXTURE.path("interpolation.toml"))
+        .arg("--data")
+        .arg(data.path())
+        .arg("--out")
+        .arg(data.path().join("out"))
+        .args(["--length", "60"])
+        .assert()
+        .success()
+        .stdout(contains("Motion generated for a test clip"));
+}
+
+#[test]
 fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
     let clip = first_clip(&FIXTURE.path("data"));
     let generate = |more: &[&str]| {

@@ -50,6 +50,10 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> anyhow::Resu
         .take(2)
         .map(|window| window.clip.name.as_str())
         .collect();
+    let clips = match names.len() {
+        1 => "a test clip",
+        _ => "two test clips",
+    };
     let names = names.join(" and ");
     let verdict = if 2 * within > plain.len() {
         "keeps to"
@@ -57,7 +61,7 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> anyhow::Resu
         "does not keep to"
     };
     let caption = format!(
-        "Figure 5. Motion generated for two test clips and its root trajectory beside the target, every {EVERY} frames: {} the root is {:.1} cm from the target, \
+        "Figure 5. Motion generated for {clips} and its root trajectory beside the target, every {EVERY} frames: {} the root is {:.1} cm from the target, \
          in {within} of {} less than {threshold} cm; {model} {verdict} its target so closely.",
         stage.measured_on(),
         mean(&distances),
