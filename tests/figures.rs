@@ -80,7 +80,7 @@ static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
     fixture
         .figures("run", "trained")
         .arg("--compare")
-        .arg(fixture.path("run"))
+        .arg(fixture.path("interpolation.toml"))
         .arg("--viewer")
         .arg(fixture.path("viewer.html"))
         .assert()
@@ -233,18 +233,16 @@ fn asked_for_changes_are_what_the_figures_say() {
 }
 
 #[test]
-fn compared_runs_have_rows_of_their_own_and_interpolation_stands_beside_trained_models() {
+fn compared_models_have_rows_of_their_own_and_interpolation_given_stands_there_once() {
     let rows = |figure: &str, measure: &str| -> Vec<String> {
         let values = values("trained", figure, measure).into_iter();
         values.map(|(row, ..)| row).collect()
     };
-    assert_eq!(
-        rows("figure_12", "LRP"),
-        ["Interpolation", "small", "small"]
-    );
-    assert_eq!(rows("figure_11", "root_distance_mean"), ["small", "small"]);
+    assert_eq!(rows("figure_12", "LRP"), ["interpolation", "small"]);
+    // Its root is the target.
+    assert_eq!(rows("figure_11", "root_distance_mean"), ["small"]);
     let page = fs::read_to_string(FIXTURE.path("viewer.html")).unwrap();
-    for name in ["Ground truth", "Interpolation", "small"] {
+    for name in ["Ground truth", "interpolation", "small"] {
         assert!(page.contains(&format!(r#""name":"{name}""#)), "{name}");
     }
 }

@@ -46,7 +46,7 @@ pub fn figure_11(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
     }
     numbers.add("all windows", "windows", stage.windows().len() as f64, "");
     let alone = if rows.len() < 2 {
-        " No other run was given to compare with (--compare)."
+        " No other trained run was given to compare with (--compare)."
     } else {
         ""
     };
