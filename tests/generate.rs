@@ -6,6 +6,8 @@ mod generated_data;
 mod martial_data;
 #[path = "common/real_data.rs"]
 mod real_data;
+#[path = "common/viewer_page.rs"]
+mod viewer_page;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,12 +17,16 @@ use assert_cmd::Command;
 use generated_data::write_clips;
 use glam::DVec3;
 use keydance::data::{DanceClip, DataConfig};
+use keydance::motion::features::VELOCITY_FACTORS;
 use keydance::motion::{Clip, Mapping, bvh};
+use keydance::synthesis::SequenceRequest;
 use martial_data::martial_folder;
+use ndarray::s;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+use viewer_page::page_data;
 
 const INTERPOLATION: &str = "name = 'interpolation'\n[model]\nkind = 'interpolation'\n";
 const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
@@ -146,6 +152,25 @@ fn a_model_that_knows_nothing_still_passes_through_the_keyframes_in_the_files_ow
     assert_eq!(summary["keyframes"][0]["missed"], Value::Null);
 }
 
+/// The velocity factors and root positions that a viewer's page says were asked for, a row a frame.
+fn asked(page: &Path) -> (Vec<[f64; 5]>, Vec<[f64; 3]>) {
+    let data = page_data(&fs::read_to_string(page).unwrap());
+    let factors = serde_json::from_value(data["asked"].clone());
+    let trajectory = serde_json::from_value(data["trajectory"].clone());
+    (factors.unwrap(), trajectory.unwrap())
+}
+
+/// The share of a path's way on the floor that is gone at each of its points.
+fn shares_of_way(path: &[[f64; 3]]) -> Vec<f64> {
+    let mut gone = vec![0.0];
+    for pair in path.windows(2) {
+        let step = (pair[1][0] - pair[0][0]).hypot(pair[1][2] - pair[0][2]);
+        gone.push(gone[gone.len() - 1] + step);
+    }
+    let whole = gone[gone.len() - 1];
+    gone.iter().map(|way| way / whole).collect()
+}
+
 #[test]
 fn controls_combine() {
     let out = TempDir::new().unwrap();
@@ -179,6 +204,8 @@ fn controls_combine() {
         ])
         .arg("--out")
         .arg(at("a.bvh"))
+        .arg("--viewer")
+        .arg(at("a.html"))
         .assert()
         .success()
         .stderr(contains("misses the root of the keyframe at frame 0"));
@@ -193,6 +220,8 @@ fn controls_combine() {
         );
     }
     assert!((dance[60][0].y - 95.0).abs() < 1e-3 && (dance[30][0].y - 85.0).abs() < 1e-3);
+    // Trunk, left leg, right leg, right arm, left arm, whatever the order of the file's columns.
+    assert_eq!(asked(&at("a.html")).0, [[5.0, 2.0, 1.5, 1.0, 0.5]; 121]);
     three_keyframes("interpolation.toml")
         .args([
             "--trajectory-through",
@@ -206,12 +235,40 @@ fn controls_combine() {
         .arg(format!("{}:30", FIXTURE.clips[1].display()))
         .arg("--out")
         .arg(at("b.bvh"))
+        .arg("--viewer")
+        .arg(at("b.html"))
         .assert()
         .success();
     let dance = world(&read(&at("b.bvh")));
     assert_eq!(dance.len(), 141);
     assert!(dance[0][0].distance(DVec3::new(-50.0, dance[0][0].y, 0.0)) < 1e-3);
     assert!(dance[140][0].distance(DVec3::new(50.0, dance[140][0].y, 0.0)) < 1e-3);
+    let features = |clip: usize| {
+        let clip = read(&FIXTURE.clips[clip]);
+        DanceClip::new(clip, None, &DataConfig::default()).unwrap()
+    };
+    let other = features(1).features;
+    let wanted = other.slice(s![30..171, VELOCITY_FACTORS]);
+    let (factors, trajectory) = asked(&at("b.html"));
+    assert_eq!(factors.len(), 141);
+    for (asked, wanted) in factors.iter().flatten().zip(wanted) {
+        assert!((asked - wanted).abs() < 0.0051, "{asked} {wanted}");
+    }
+    // The curve is gone at the speeds of the clip, stretched to the same times; at one speed it would be elsewhere.
+    let clip = SequenceRequest::from_clip(&features(0), &[20, 80, 140]).unwrap();
+    let clip = clip.at_times(&[0, 100, 140]).unwrap().root_trajectory;
+    let clip: Vec<[f64; 3]> = clip
+        .rows()
+        .into_iter()
+        .map(|place| [place[0], place[1], place[2]])
+        .collect();
+    let (recorded, found) = (shares_of_way(&clip), shares_of_way(&trajectory));
+    let off_by = |other: &dyn Fn(usize) -> f64| {
+        let apart = (0..=140).map(|frame| (found[frame] - other(frame)).abs());
+        apart.fold(0.0, f64::max)
+    };
+    assert!(off_by(&|frame| recorded[frame]) < 0.005);
+    assert!(off_by(&|frame| frame as f64 / 140.0) > 0.05);
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/viewer_page.rs"]
+mod viewer_page;
 
 use std::fs;
 
@@ -14,8 +16,8 @@ use keydance::models::interpolation::Interpolation;
 use keydance::motion::placement::world_positions;
 use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use ndarray::{Axis, concatenate, s};
-use serde_json::Value;
 use tempfile::TempDir;
+use viewer_page::page_data;
 
 const LENGTH: usize = 250;
 
@@ -58,18 +60,11 @@ fn viewer() -> Viewer {
     }
 }
 
-/// What the page's scripts read.
-fn data(page: &str) -> Value {
-    let start = page.find(r#"id="motion-data">"#).unwrap() + r#"id="motion-data">"#.len();
-    let end = start + page[start..].find("</script>").unwrap();
-    serde_json::from_str(&page[start..end]).unwrap()
-}
-
 #[test]
 fn three_motions_of_250_frames_fit_into_a_page_of_half_a_megabyte_that_needs_no_network() {
     let page = viewer().html().unwrap();
     assert!(page.len() < 500_000, "{} bytes", page.len());
-    let data = data(&page);
+    let data = page_data(&page);
     assert_eq!(data["frames"], 251);
     assert_eq!(data["motions"].as_array().unwrap().len(), 3);
     assert_eq!(data["motions"][1]["factors"].as_array().unwrap().len(), 251);
@@ -95,7 +90,7 @@ fn names_that_look_like_markup_stay_names() {
     for tag in ["<script", "</script", "<!--", "<title"] {
         assert_eq!(count(&page, tag), count(&plain, tag), "{tag}");
     }
-    assert_eq!(data(&page)["motions"][0]["name"], name);
+    assert_eq!(page_data(&page)["motions"][0]["name"], name);
     assert!(page.contains("<title>&lt;/script&gt;&lt;script&gt;alert(1)"));
 }
 
