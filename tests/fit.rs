@@ -235,6 +235,29 @@ fn a_hand_turns_evenly_from_one_keyframe_to_the_next() {
 }
 
 #[test]
+fn a_twist_that_positions_do_not_show_follows_the_way_between_the_keyframes() {
+    let still = clip(41, 0.0);
+    let mut end = still.poses[40].clone();
+    // The forearm about its own bone, which leads along Y.
+    end.rotations[16] = DQuat::from_rotation_y(1.0);
+    let wanted = &world(&still)[1..];
+    let fit = fit_rotations(&still.skeleton, wanted, &still.poses[0], Some(&end)).unwrap();
+    let mut before = 0.0;
+    for (frame, pose) in fit.poses.iter().enumerate() {
+        let rotation = pose.rotations[16];
+        let twist = 2.0 * rotation.y.atan2(rotation.w);
+        assert!(
+            twist > before,
+            "frame {frame}: {twist} rad after {before} rad"
+        );
+        assert!(rotation.angle_between(DQuat::from_rotation_y(twist)) < 1e-6);
+        before = twist;
+    }
+    // It lags by some eight frames of 1/40 rad each.
+    assert!((0.6..=1.0).contains(&before), "{before} rad");
+}
+
+#[test]
 fn a_bent_elbow_shows_how_the_upper_arm_is_turned() {
     let mut bent = clip(41, 0.0);
     for (time, pose) in bent.poses.iter_mut().enumerate() {
