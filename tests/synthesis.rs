@@ -348,6 +348,30 @@ fn feet_in_contact_are_pinned_and_keyframes_stay() {
 }
 
 #[test]
+fn what_a_model_predicts_too_little_of_or_no_numbers_for_is_an_error_that_names_the_frames() {
+    let clip = dance(4, 120);
+    let request = SequenceRequest::from_clip(&clip, &[20, 100]).unwrap();
+    let predicted = clip.features.slice(s![21..=100, ..FRAME]);
+    let error = |frames: Array2<f64>| {
+        let error = synthesise(&Sliding { frames }, &request, &PLAIN, "dance").unwrap_err();
+        let SynthesisError::Transition { from, to, source } = error else {
+            panic!("{error}");
+        };
+        assert_eq!((from, to), (0, 80));
+        source.to_string()
+    };
+    let text = error(predicted.slice(s![..79, ..]).to_owned());
+    assert!(
+        text.contains("[79, 149]") && text.contains("[80, 149]"),
+        "{text}"
+    );
+    let mut infinite = predicted.to_owned();
+    infinite[[3, CONTACTS.start]] = f64::INFINITY;
+    let text = error(infinite);
+    assert!(text.contains("a NaN or an infinity"), "{text}");
+}
+
+#[test]
 fn contacts_are_those_that_the_model_predicts() {
     let clip = dance(4, 120);
     let request = SequenceRequest::from_clip(&clip, &[20, 100]).unwrap();

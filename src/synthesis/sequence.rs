@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1, Axis, concatenate, s};
+use ndarray::{Array2, ArrayView1, s};
 
 use super::blend::{Start, Track, blend};
 use super::foot_cleanup::pin_feet;
@@ -123,21 +123,20 @@ pub fn synthesise(
         let before = &request.keyframes[index - 1].keyframe;
         let turned = asked.start.features[FACING.start] - before.features[FACING.start];
         asked.target.features[FACING.start] += (turned / TAU).round() * TAU;
-        let mut transitions =
-            model
-                .transitions(std::slice::from_ref(&asked))
-                .map_err(|source| SynthesisError::Transition {
-                    from,
-                    to,
-                    source: Box::new(source),
-                })?;
-        let frames = match transitions.pop() {
-            Some(transition) => transition.frames,
-            None => {
-                let model = model.name().into();
-                return Err(SynthesisError::NoTransition { model });
-            }
+        let failed = |source| SynthesisError::Transition {
+            from,
+            to,
+            source: Box::new(source),
         };
+        let mut transitions = model
+            .transitions(std::slice::from_ref(&asked))
+            .map_err(failed)?;
+        let Some(transition) = transitions.pop() else {
+            let model = model.name().into();
+            return Err(SynthesisError::NoTransition { model });
+        };
+        transition.check(to - from).map_err(failed)?;
+        let frames = transition.frames;
         let positions: Vec<_> = frames.rows().into_iter().map(world_positions).collect();
         let fit = fit_rotations(
             &request.skeleton,
@@ -163,7 +162,7 @@ pub fn synthesise(
         };
         let facing = asked.target.features[FACING.start];
         blend(&mut track, &motion.start(), &asked.target.pose, facing);
-        motion.append(track, frames);
+        motion.append(track, &frames);
     }
     Ok(motion.finish(misses, &fits, options, name))
 }
@@ -189,19 +188,22 @@ struct Motion<'r> {
     request: &'r SequenceRequest,
     poses: Vec<Pose>,
     facing: Vec<f64>,
-    /// `[frames, 149]`, as in [`Sequence::predicted`].
+    /// `[F, 149]`, as in [`Sequence::predicted`]; zeros in the frames to come.
     predicted: Array2<f64>,
 }
 
 impl<'r> Motion<'r> {
     fn new(request: &'r SequenceRequest) -> Self {
         let first = &request.keyframes[0].keyframe;
-        let features = first.features.slice(s![..FRAME]);
+        let mut predicted = Array2::zeros((request.frames(), FRAME));
+        predicted
+            .row_mut(0)
+            .assign(&first.features.slice(s![..FRAME]));
         Self {
             request,
             poses: vec![first.pose.clone()],
-            facing: vec![features[FACING.start]],
-            predicted: features.to_owned().insert_axis(Axis(0)),
+            facing: vec![first.features[FACING.start]],
+            predicted,
         }
     }
 
@@ -236,12 +238,15 @@ impl<'r> Motion<'r> {
         }
     }
 
-    fn append(&mut self, track: Track, frames: Array2<f64>) {
+    /// The frames of a transition, with what was predicted for them.
+    fn append(&mut self, track: Track, frames: &Array2<f64>) {
+        let from = self.poses.len();
+        let mut rows = self
+            .predicted
+            .slice_mut(s![from..from + frames.nrows(), ..]);
+        rows.assign(frames);
         self.poses.extend(track.poses);
         self.facing.extend(track.facing);
-        // The columns are the same by construction.
-        let rows = [self.predicted.view(), frames.view()];
-        self.predicted = concatenate(Axis(0), &rows).unwrap_or_default();
     }
 
     /// Features of some frames, measured on the poses; the first of them takes its velocity from the first keyframe.

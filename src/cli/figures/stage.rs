@@ -146,6 +146,7 @@ impl<'d> Stage<'d> {
             .into_iter()
             .zip(predicted)
             .map(|(request, predicted)| {
+                predicted.check(request.frames() - 1)?;
                 let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
                 let first = first.insert_axis(Axis(0));
                 let frames = concatenate(Axis(0), &[first, predicted.frames.view()])?;
