@@ -143,16 +143,6 @@ impl Keyframes {
                 let source = read.source(&keyframe.file)?;
                 read.sources.insert(keyframe.file.clone(), source);
             }
-            let frames = read.sources[&keyframe.file].clip.frames();
-            if keyframe.frame >= frames {
-                bail!(
-                    "{} has no frame {}: its frames are 0 to {} at {} a second",
-                    keyframe.file.display(),
-                    keyframe.frame,
-                    frames - 1,
-                    data.fps
-                );
-            }
         }
         Ok(read)
     }
@@ -217,7 +207,7 @@ impl Keyframes {
     /// The request: trajectory and velocity factors of `--motion` where there is one.
     ///
     /// # Errors
-    /// Dancers that do not fit each other; keyframes beyond the end of `--motion`; lengths that do not fit the keyframes.
+    /// Frames that a file does not have; dancers that do not fit each other; keyframes beyond the end of `--motion`; lengths that do not fit the keyframes.
     pub fn request(&self, args: &KeyframeArgs) -> anyhow::Result<SequenceRequest> {
         let sources: Vec<KeyframeSource> = self
             .keyframes
