@@ -4,9 +4,9 @@ use glam::{DQuat, DVec3};
 use ndarray::s;
 use rayon::prelude::*;
 
-use super::motion_rows::{rows_from, shorter_turn, write_contacts, write_velocities};
+use super::motion_rows::{rows_from, shorter_turn, write_contacts};
 use super::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
-use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION};
+use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 use crate::motion::{Pose, Skeleton};
 
 /// Spherical interpolation between the keyframes (the row "Interpolation" of table 2). Nothing is learned.

@@ -3,9 +3,9 @@
 use ndarray::s;
 use rayon::prelude::*;
 
-use super::motion_rows::{rows_from, shorter_turn, write_contacts, write_velocities};
+use super::motion_rows::{rows_from, shorter_turn, write_contacts};
 use super::{ModelError, Transition, TransitionModel, TransitionRequest};
-use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION};
+use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 
 /// Linear interpolation of p^b between the keyframes. Nothing is learned; bones get shorter on the way.
 ///

@@ -1,26 +1,10 @@
-//! What follows from the positions of frames in a row: velocities and contact labels.
+//! Rows of frames to be filled, and the contact labels that follow from their positions.
 
 use ndarray::{Array2, s};
 
 use crate::motion::contact::FOOT_JOINTS;
-use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FRAME, ROOT_POSITION, ROOT_VELOCITY,
-};
+use crate::motion::features::{CONTACTS, FRAME};
 use crate::motion::placement::world_positions;
-
-/// Writes v^b and v^r of all rows but the first, as the differences of p^b and p^r. `rows`: frames k1, k1 + 1, .., `[N + 1, 149]`, cm.
-pub(super) fn write_velocities(rows: &mut Array2<f64>) {
-    for row in 1..rows.nrows() {
-        for (velocities, positions) in [
-            (BODY_VELOCITIES, BODY_POSITIONS),
-            (ROOT_VELOCITY, ROOT_POSITION),
-        ] {
-            for (velocity, position) in velocities.zip(positions) {
-                rows[[row, velocity]] = rows[[row, position]] - rows[[row - 1, position]];
-            }
-        }
-    }
-}
 
 /// Writes the contact labels of all rows but the first: 1 where the joint's squared speed in the world is below `threshold`,
 /// (cm/frame)^2. `rows`: frames k1, k1 + 1, .., `[N + 1, 149]`.

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use ndarray::{Array2, ArrayView1, s};
 
-use super::motion_rows::{rows_from, write_velocities};
+use super::motion_rows::rows_from;
 use crate::motion::facing::facing_angles_between;
-use crate::motion::features::{CONTACTS, FACING, write_positions};
+use crate::motion::features::{CONTACTS, FACING, write_positions, write_velocities};
 use crate::motion::placement::world_positions;
 
 /// The 149 numbers of frames k1 + 1 .. k2, `[N, 149]`, not standardised.

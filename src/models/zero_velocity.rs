@@ -3,9 +3,9 @@
 use ndarray::s;
 use rayon::prelude::*;
 
-use super::motion_rows::{rows_from, write_contacts, write_velocities};
+use super::motion_rows::{rows_from, write_contacts};
 use super::{ModelError, Transition, TransitionModel, TransitionRequest};
-use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION};
+use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 
 /// Every frame has p^b and o^r of keyframe k1. Nothing is learned, and the target is not looked at: the floor of any model.
 ///

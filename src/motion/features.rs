@@ -102,13 +102,8 @@ pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, Feat
             frame[slot] = label;
         }
     }
+    write_velocities(&mut features);
     for time in 1..world.len() {
-        let velocity = |range: Range<usize>| {
-            &features.slice(s![time, range.clone()]) - &features.slice(s![time - 1, range])
-        };
-        let (body, root) = (velocity(BODY_POSITIONS), velocity(ROOT_POSITION));
-        features.slice_mut(s![time, BODY_VELOCITIES]).assign(&body);
-        features.slice_mut(s![time, ROOT_VELOCITY]).assign(&root);
         let velocities =
             std::array::from_fn(|number| features[[time, BODY_VELOCITIES.start + number]]);
         for (slot, factor) in VELOCITY_FACTORS.zip(velocity_factors(&velocities)) {
@@ -133,6 +128,20 @@ pub fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], faci
         frame[slot] = value;
     }
     frame[FACING.start] = facing;
+}
+
+/// Writes v^b and v^r of all rows but the first, as the differences of p^b and p^r. `rows`: frames in a row, `[frames, 149 or 154]`, cm.
+pub fn write_velocities(rows: &mut Array2<f64>) {
+    for row in 1..rows.nrows() {
+        for (velocities, positions) in [
+            (BODY_VELOCITIES, BODY_POSITIONS),
+            (ROOT_VELOCITY, ROOT_POSITION),
+        ] {
+            let change =
+                &rows.slice(s![row, positions.clone()]) - &rows.slice(s![row - 1, positions]);
+            rows.slice_mut(s![row, velocities]).assign(&change);
+        }
+    }
 }
 
 fn check(clip: &Clip, config: &FeatureConfig) -> Result<(), FeatureError> {

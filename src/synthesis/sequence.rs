@@ -11,8 +11,7 @@ use super::{SequenceRequest, SynthesisError};
 use crate::models::{KeyframePose, TransitionModel};
 use crate::motion::contact::foot_skate;
 use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
-    VELOCITY_FACTORS, write_positions,
+    CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
 use crate::motion::fit::fit_rotations;
 use crate::motion::placement::world_positions;
@@ -258,16 +257,7 @@ impl<'r> Motion<'r> {
             row.slice_mut(s![CONTACTS])
                 .mapv_inplace(|label| label.clamp(0.0, 1.0));
         }
-        for frame in 1..rows.nrows() {
-            for (velocities, positions) in [
-                (BODY_VELOCITIES, BODY_POSITIONS),
-                (ROOT_VELOCITY, ROOT_POSITION),
-            ] {
-                for (velocity, position) in velocities.zip(positions) {
-                    rows[[frame, velocity]] = rows[[frame, position]] - rows[[frame - 1, position]];
-                }
-            }
-        }
+        write_velocities(&mut rows);
         rows
     }
 
