@@ -167,7 +167,7 @@ impl SequenceRequest {
     }
 
     /// The request for the transition to keyframe `index` (from 1 on) that starts from `start`, which stands at the keyframe before.
-    pub(super) fn transition(&self, index: usize, start: KeyframePose) -> TransitionRequest {
+    pub(crate) fn transition(&self, index: usize, start: KeyframePose) -> TransitionRequest {
         let (from, to) = (&self.keyframes[index - 1], &self.keyframes[index]);
         let rows = |of: ArrayView2<f64>| of.slice(s![from.time..=to.time, ..]).to_owned();
         TransitionRequest {

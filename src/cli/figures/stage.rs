@@ -136,7 +136,10 @@ impl<'d> Stage<'d> {
             .iter()
             .map(|window| change(window.request.clone()))
             .collect::<Result<_, _>>()?;
-        let transitions: Vec<TransitionRequest> = requests.iter().map(transition).collect();
+        let transitions: Vec<TransitionRequest> = requests
+            .iter()
+            .map(|request| request.transition(1, request.keyframes[0].keyframe.clone()))
+            .collect();
         let predicted: Vec<Vec<Transition>> = transitions
             .par_chunks(CHUNK)
             .map(|chunk| model.transitions(chunk))
@@ -153,18 +156,6 @@ impl<'d> Stage<'d> {
                 Ok(Generated { request, frames })
             });
         generated.collect()
-    }
-}
-
-/// The one transition of a request with two keyframes.
-fn transition(request: &SequenceRequest) -> TransitionRequest {
-    let [start, target] = [0, 1].map(|index| request.keyframes[index].keyframe.clone());
-    TransitionRequest {
-        skeleton: request.skeleton.clone(),
-        start,
-        target,
-        root_trajectory: request.root_trajectory.clone(),
-        velocity_factors: request.velocity_factors.clone(),
     }
 }
 
