@@ -96,7 +96,7 @@ pub fn mean_velocity_factors(frames: ArrayView2<f64>) -> [f64; PARTS] {
     mean_rows(&measured_velocity_factors(frames)[1..])
 }
 
-/// Mean of rows of velocity factors.
+/// Mean of rows of velocity factors, `[5]`, in their unit; NaN for no rows.
 pub fn mean_rows(rows: &[[f64; PARTS]]) -> [f64; PARTS] {
     std::array::from_fn(|part| rows.iter().map(|row| row[part]).sum::<f64>() / rows.len() as f64)
 }

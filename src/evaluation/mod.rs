@@ -8,7 +8,9 @@ pub mod scores;
 pub mod tables;
 pub mod window_request;
 
-pub use effect::{FOLLOWED, Response, body_distance, mean_velocity_factors, root_response};
+pub use effect::{
+    FOLLOWED, Response, body_distance, mean_rows, mean_velocity_factors, root_response,
+};
 pub use metrics::{WindowScores, window_scores};
 pub use protocol::{EvaluationError, Outcome, Protocol, SkippedClip};
 pub use scores::{Evaluation, LengthScores};

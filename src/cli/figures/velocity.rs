@@ -4,7 +4,7 @@ use super::output::{Figure, Numbers};
 use super::root::mean_body_distance;
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
-use crate::evaluation::{Response, mean_velocity_factors};
+use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
 use crate::models::TransitionModel;
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line, Scale};
@@ -210,8 +210,7 @@ pub fn mean_parts(
     generated: &[Generated],
     of: impl Fn(&Generated) -> [f64; PARTS],
 ) -> [f64; PARTS] {
-    let all: Vec<[f64; PARTS]> = generated.iter().map(of).collect();
-    std::array::from_fn(|part| mean(&all.iter().map(|parts| parts[part]).collect::<Vec<_>>()))
+    mean_rows(&generated.iter().map(of).collect::<Vec<_>>())
 }
 
 fn measured(generated: &Generated) -> [f64; PARTS] {
