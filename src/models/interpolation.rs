@@ -4,8 +4,9 @@ use glam::{DQuat, DVec3};
 use ndarray::s;
 use rayon::prelude::*;
 
-use super::motion_rows::{rows_from, shorter_turn, write_contacts};
+use super::motion_rows::{rows_from, write_contacts};
 use super::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
+use crate::data::window::wrap;
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 use crate::motion::{Pose, Skeleton};
 
@@ -51,7 +52,7 @@ impl Interpolation {
         let start = facing_pose(&request.start);
         let target = facing_pose(&request.target);
         let facing = request.start.features[FACING.start];
-        let turn = shorter_turn(facing, request.target.features[FACING.start]);
+        let turn = wrap(request.target.features[FACING.start] - facing);
 
         let mut rows = rows_from(request.start.features.view(), length);
         for step in 1..=length {

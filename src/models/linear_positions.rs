@@ -3,8 +3,9 @@
 use ndarray::s;
 use rayon::prelude::*;
 
-use super::motion_rows::{rows_from, shorter_turn, write_contacts};
+use super::motion_rows::{rows_from, write_contacts};
 use super::{ModelError, Transition, TransitionModel, TransitionRequest};
+use crate::data::window::wrap;
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 
 /// Linear interpolation of p^b between the keyframes. Nothing is learned; bones get shorter on the way.
@@ -37,7 +38,7 @@ impl LinearPositions {
         request.check()?;
         let length = request.length();
         let (start, target) = (&request.start.features, &request.target.features);
-        let turn = shorter_turn(start[FACING.start], target[FACING.start]);
+        let turn = wrap(target[FACING.start] - start[FACING.start]);
         let mut rows = rows_from(start.view(), length);
         for step in 1..=length {
             let share = step as f64 / length as f64;

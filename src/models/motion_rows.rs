@@ -26,9 +26,3 @@ pub(super) fn rows_from(start: ndarray::ArrayView1<f64>, length: usize) -> Array
     rows.row_mut(0).assign(&start.slice(s![..FRAME]));
     rows
 }
-
-/// Signed angle from `from` to `to` the shorter way round, in [-pi, pi).
-pub(super) fn shorter_turn(from: f64, to: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    (to - from + PI).rem_euclid(TAU) - PI
-}

@@ -6,10 +6,11 @@
 //! bones keep their lengths. The curve is the quintic of inertial blending (Bollo 2018): value and velocity given at one end; value,
 //! velocity and acceleration 0 at the other.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
 
+use crate::data::window::wrap;
 use crate::motion::Pose;
 
 /// Frames over which an offset decays.
@@ -54,7 +55,7 @@ pub(super) fn blend(track: &mut Track, start: &Start<'_>, target: &Pose, target_
     let facing = |angle: f64| DVec3::new(angle, 0.0, 0.0);
     let angles: Vec<DVec3> = track.facing.iter().map(|&angle| facing(angle)).collect();
     let last = track.facing[length - 1];
-    let nearest = last + (target_facing - last + PI).rem_euclid(TAU) - PI;
+    let nearest = last + wrap(target_facing - last);
     let offset = Offset::new(
         &angles,
         facing(start.facing),
