@@ -14,7 +14,7 @@ use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
 use crate::motion::fit::fit_rotations;
-use crate::motion::placement::world_positions;
+use crate::motion::placement::{vector, world_positions};
 use crate::motion::{Clip, JOINTS, Pose};
 
 /// A foot joint is in contact where its predicted label is above this.
@@ -89,7 +89,7 @@ pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64,
     let asked = request.root_trajectory.rows().into_iter();
     let distances: Vec<f64> = asked
         .zip(&sequence.clip.poses)
-        .map(|(row, pose)| pose.translations[0].distance(DVec3::new(row[0], row[1], row[2])))
+        .map(|(row, pose)| pose.translations[0].distance(vector(row)))
         .collect();
     let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     (mean, distances.iter().copied().fold(0.0, f64::max))

@@ -9,7 +9,7 @@ use crate::data::{DanceClip, window_features};
 use crate::models::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
-use crate::motion::placement::world_positions;
+use crate::motion::placement::{vector, world_positions};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 /// Windows that a model predicts in one call.
@@ -199,6 +199,5 @@ pub fn positions(frames: ArrayView2<f64>) -> Vec<[DVec3; JOINTS]> {
 }
 
 fn points(rows: ArrayView2<f64>) -> Vec<DVec3> {
-    let point = |row: ndarray::ArrayView1<f64>| DVec3::new(row[0], row[1], row[2]);
-    rows.rows().into_iter().map(point).collect()
+    rows.rows().into_iter().map(vector).collect()
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::FigureError;
 use crate::motion::contact::FOOT_JOINTS;
 use crate::motion::features::CONTACTS;
-use crate::motion::placement::world_positions;
+use crate::motion::placement::{vector, world_positions};
 use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
 use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
@@ -51,10 +51,9 @@ pub struct Asked {
 impl Asked {
     /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame. Panics on fewer columns.
     pub fn new(root_trajectory: ArrayView2<f64>, velocity_factors: ArrayView2<f64>) -> Self {
-        let place = |row: ArrayView1<f64>| DVec3::new(row[0], row[1], row[2]);
         let factors = |row: ArrayView1<f64>| std::array::from_fn(|part| row[part]);
         Self {
-            root_trajectory: root_trajectory.rows().into_iter().map(place).collect(),
+            root_trajectory: root_trajectory.rows().into_iter().map(vector).collect(),
             velocity_factors: velocity_factors.rows().into_iter().map(factors).collect(),
         }
     }

@@ -12,15 +12,10 @@ pub(crate) use curve::timed_curve;
 pub use curve::{Speed, smooth_curve};
 
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView2};
 
 #[cfg(doc)]
 use super::SequenceRequest;
-
-/// Three numbers of a row.
-fn vector(row: ArrayView1<f64>) -> DVec3 {
-    DVec3::new(row[0], row[1], row[2])
-}
 
 /// The row at a time between rows, by a Catmull-Rom spline through all of them with equal steps; the ends are held.
 fn row_at(rows: ArrayView2<f64>, time: f64) -> Vec<f64> {

@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3};
 use ndarray::{Array2, s};
 
-use super::{rows_of, vector};
+use super::rows_of;
 use crate::motion::features::{FACING, ROOT_VELOCITY};
+use crate::motion::placement::vector;
 use crate::synthesis::request::check_shape;
 use crate::synthesis::retarget::move_root;
 use crate::synthesis::{SequenceRequest, SynthesisError};
