@@ -5,10 +5,8 @@ use std::ops::Range;
 use ndarray::{ArrayView2, s};
 
 use crate::models::{ModelError, Transition};
-use crate::motion::contact::FOOT_JOINTS;
-use crate::motion::features::{
-    BODY_POSITIONS, CONTACTS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS,
-};
+use crate::motion::contact::{FOOT_JOINTS, in_contact};
+use crate::motion::features::{BODY_POSITIONS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::placement::world_positions;
 use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
@@ -89,8 +87,8 @@ pub fn window_scores(
         sums.velocity_factor += factor_error / PARTS as f64;
         sums.root += distance(ROOT_POSITION);
         let world = world_positions(frame);
-        for (label, joint) in CONTACTS.zip(FOOT_JOINTS) {
-            if truth[label] > 0.5 {
+        for (joint, on) in FOOT_JOINTS.into_iter().zip(in_contact(truth)) {
+            if on {
                 sums.foot_travel += world[joint].distance(before_world[joint]);
                 sums.foot_contacts += 1;
             }

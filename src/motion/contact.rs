@@ -1,9 +1,22 @@
 //! Foot contacts: a foot joint that hardly moves in the world stands on the ground.
 
 use glam::DVec3;
+use ndarray::ArrayView1;
+
+use super::features::CONTACTS;
 
 /// The foot joints of the dance skeleton, in the order of the labels: LeftFoot, LeftToeBase, RightFoot, RightToeBase.
 pub const FOOT_JOINTS: [usize; 4] = [3, 4, 7, 8];
+
+/// A foot joint is in contact where its label is above this.
+const CONTACT_LABEL: f64 = 0.5;
+
+/// Which foot joints are in contact by the labels of a frame, in the order of [`FOOT_JOINTS`].
+///
+/// `frame`: the 149 numbers of a predicted frame or the 154 of a recorded one, not standardised. Panics on fewer than 77 numbers.
+pub fn in_contact(frame: ArrayView1<f64>) -> [bool; 4] {
+    std::array::from_fn(|foot| frame[CONTACTS.start + foot] > CONTACT_LABEL)
+}
 
 /// Contact labels of every frame, `[frames][4]`: 1 where the squared world-space speed is below `threshold` ((cm/frame)^2).
 ///

@@ -18,7 +18,6 @@ pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
 pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};
 pub use sequence::{
-    CONTACT_LABEL, FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise,
-    trajectory_error,
+    FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise, trajectory_error,
 };
 pub use warning::{ControlWarning, control_warnings, moved_warnings};

@@ -3,22 +3,19 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1, s};
+use ndarray::{Array2, s};
 
 use super::blend::{Start, Track, blend};
 use super::foot_cleanup::pin_feet;
 use super::{SequenceRequest, SynthesisError};
 use crate::models::{KeyframePose, TransitionModel};
-use crate::motion::contact::foot_skate;
+use crate::motion::contact::{foot_skate, in_contact};
 use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
 use crate::motion::fit::fit_rotations;
 use crate::motion::placement::{vector, world_positions};
 use crate::motion::{Clip, JOINTS, Pose};
-
-/// A foot joint is in contact where its predicted label is above this.
-pub const CONTACT_LABEL: f64 = 0.5;
 
 /// What is done to the predicted motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -307,9 +304,4 @@ impl<'r> Motion<'r> {
             predicted: self.predicted,
         }
     }
-}
-
-/// Which foot joints a frame is predicted to have on the ground.
-fn in_contact(frame: ArrayView1<f64>) -> [bool; 4] {
-    std::array::from_fn(|foot| frame[CONTACTS.start + foot] > CONTACT_LABEL)
 }

@@ -11,8 +11,7 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde::Serialize;
 
 use super::FigureError;
-use crate::motion::contact::FOOT_JOINTS;
-use crate::motion::features::CONTACTS;
+use crate::motion::contact::{FOOT_JOINTS, in_contact};
 use crate::motion::placement::{vector, world_positions};
 use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
 use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
@@ -20,8 +19,6 @@ use positions::Steps;
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;
-/// A foot joint is drawn as standing where its contact label is at least this.
-const CONTACT: f64 = 0.5;
 /// The body parts as the page calls them.
 const PART_LABELS: [&str; PARTS] = ["Trunk", "Left leg", "Right leg", "Right arm", "Left arm"];
 
@@ -99,14 +96,11 @@ impl ViewerMotion {
         kind: MotionKind,
         frames: ArrayView2<f64>,
     ) -> Self {
-        let contacts = |frame: ArrayView1<f64>| {
-            std::array::from_fn(|foot| frame[CONTACTS.start + foot] >= CONTACT)
-        };
         Self {
             name: name.into(),
             kind,
             positions: frames.rows().into_iter().map(world_positions).collect(),
-            contacts: frames.rows().into_iter().map(contacts).collect(),
+            contacts: frames.rows().into_iter().map(in_contact).collect(),
             velocity_factors: measured_velocity_factors(frames),
         }
     }
