@@ -119,6 +119,22 @@ struct Layout {
 }
 
 impl MotionFigure {
+    /// A figure whose rows each stand on their own root's path.
+    pub fn on_own_paths(
+        title: String,
+        caption: String,
+        rows: Vec<MotionRow>,
+        shown: Shown,
+    ) -> Self {
+        Self {
+            title,
+            caption,
+            rows,
+            shown,
+            placing: Placing::OnOwnPath,
+        }
+    }
+
     /// The figure as an SVG document.
     ///
     /// # Errors

@@ -55,13 +55,8 @@ pub fn figure_11(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
         stage.measured_on(),
         said.join(", ")
     );
-    let drawing = MotionFigure {
-        title: format!("Figure 11: {}", stage.shown().describe()),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = format!("Figure 11: {}", stage.shown().describe());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_11", drawing, numbers)
 }
 

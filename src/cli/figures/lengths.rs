@@ -7,7 +7,7 @@ use super::velocity::{asked_after, mean_parts};
 use super::wording::{mean, percent};
 use crate::evaluation::{FOLLOWED, mean_velocity_factors};
 use crate::models::TransitionModel;
-use crate::report::{MotionFigure, MotionRow, Placing, Shown};
+use crate::report::{MotionFigure, MotionRow, Shown};
 use ndarray::s;
 
 /// Transition lengths of the paper's figure, frames.
@@ -86,12 +86,7 @@ pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<F
         stage.measured_on(),
         said.join(", ")
     );
-    let drawing = MotionFigure {
-        title: stage.title("Figure 10", name),
-        caption,
-        rows,
-        shown: Shown::Count(DANCERS),
-        placing: Placing::OnOwnPath,
-    };
+    let title = stage.title("Figure 10", name);
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Count(DANCERS));
     Figure::of_dancers("figure_10", drawing, numbers)
 }

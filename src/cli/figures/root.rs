@@ -7,7 +7,7 @@ use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
 use crate::evaluation::{Protocol, Response, body_distance, root_response};
 use crate::models::TransitionModel;
-use crate::report::{MotionFigure, MotionRow, PathView, Placing, RootPaths, Shown};
+use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
@@ -67,13 +67,8 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> anyhow::Resu
         mean(&distances),
         plain.len()
     );
-    let drawing = MotionFigure {
-        title: format!("Figure 5: {model} on {names}"),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = format!("Figure 5: {model} on {names}");
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_5", drawing, numbers)
 }
 
@@ -120,13 +115,8 @@ pub fn figure_6(
             &responses.map(|(response, _)| response)
         )
     );
-    let drawing = MotionFigure {
-        title: stage.title("Figure 6", model.name()),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = stage.title("Figure 6", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_6", drawing, numbers)
 }
 
@@ -190,13 +180,8 @@ pub fn figure_7(
         mean(&distances),
         Verdict::of(model.name(), "the root trajectory", &answers)
     );
-    let drawing = MotionFigure {
-        title: stage.title("Figure 7", model.name()),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = stage.title("Figure 7", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_7", drawing, numbers)
 }
 

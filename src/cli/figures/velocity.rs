@@ -8,7 +8,7 @@ use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
 use crate::models::TransitionModel;
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line, Scale};
-use crate::report::{MotionFigure, MotionRow, Placing, Shown};
+use crate::report::{MotionFigure, MotionRow, Shown};
 use crate::synthesis::{SequenceRequest, SynthesisOptions, synthesise};
 use ndarray::s;
 
@@ -117,13 +117,8 @@ pub fn figure_8(
         said.join(", "),
         Verdict::of(model.name(), "the velocity factors", &all)
     );
-    let drawing = MotionFigure {
-        title: stage.title("Figure 8", model.name()),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = stage.title("Figure 8", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_8", drawing, numbers)
 }
 
@@ -180,13 +175,8 @@ pub fn figure_9(
             &of_chosen
         )
     );
-    let drawing = MotionFigure {
-        title: stage.title("Figure 9", model.name()),
-        caption,
-        rows,
-        shown: Shown::Every(EVERY),
-        placing: Placing::OnOwnPath,
-    };
+    let title = stage.title("Figure 9", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_9", drawing, numbers)
 }
 
