@@ -129,6 +129,15 @@ impl Chart {
 }
 
 impl Axis {
+    /// A linear axis from 0.
+    pub fn linear(label: &str) -> Self {
+        Self {
+            label: label.into(),
+            scale: Scale::Linear,
+            from_zero: true,
+        }
+    }
+
     fn shows(&self, value: f64) -> bool {
         self.scale == Scale::Linear || value > 0.0
     }

@@ -34,11 +34,7 @@ pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureEr
     Chart {
         title: title.to_string(),
         caption: String::new(),
-        x: Axis {
-            label: "training (frame-steps)".into(),
-            scale: Scale::Linear,
-            from_zero: true,
-        },
+        x: Axis::linear("training (frame-steps)"),
         y: Axis {
             label: "loss (standardised units, log scale)".into(),
             scale: Scale::Logarithmic,

@@ -1,7 +1,7 @@
 //! LRP over the transition length, for several models.
 
 use super::FigureError;
-use super::chart::{Axis, Chart, Line, Scale};
+use super::chart::{Axis, Chart, Line};
 
 /// LRP of one model at each transition length.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,16 +40,8 @@ pub fn lrp_curve(title: &str, models: &[LrpSeries]) -> Result<String, FigureErro
     Chart {
         title: title.to_string(),
         caption: String::new(),
-        x: Axis {
-            label: "transition length N (frames at 30 fps)".into(),
-            scale: Scale::Linear,
-            from_zero: true,
-        },
-        y: Axis {
-            label: "LRP (cm), lower is better".into(),
-            scale: Scale::Linear,
-            from_zero: true,
-        },
+        x: Axis::linear("transition length N (frames at 30 fps)"),
+        y: Axis::linear("LRP (cm), lower is better"),
         lines,
     }
     .svg()

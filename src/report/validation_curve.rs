@@ -1,7 +1,7 @@
 //! LRP over the course of a training: whether more of it would still help.
 
 use super::FigureError;
-use super::chart::{Axis, Chart, Line, Scale};
+use super::chart::{Axis, Chart, Line};
 
 /// LRP at one transition length.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,16 +29,8 @@ pub fn validation_curve(title: &str, lengths: &[ValidationSeries]) -> Result<Str
     Chart {
         title: title.to_string(),
         caption: String::new(),
-        x: Axis {
-            label: "training (frame-steps)".into(),
-            scale: Scale::Linear,
-            from_zero: true,
-        },
-        y: Axis {
-            label: "LRP (cm), lower is better".into(),
-            scale: Scale::Linear,
-            from_zero: true,
-        },
+        x: Axis::linear("training (frame-steps)"),
+        y: Axis::linear("LRP (cm), lower is better"),
         lines: lines.collect(),
     }
     .svg()

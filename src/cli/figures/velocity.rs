@@ -7,7 +7,7 @@ use super::wording::{Verdict, mean, percent};
 use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
 use crate::models::TransitionModel;
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
-use crate::report::chart::{Axis, Chart, Line, Scale};
+use crate::report::chart::{Axis, Chart, Line};
 use crate::report::{MotionFigure, MotionRow, Shown};
 use crate::synthesis::{SequenceRequest, SynthesisOptions, synthesise};
 use ndarray::s;
@@ -53,16 +53,11 @@ pub fn figure_4b(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<F
         dots: false,
         colour: part,
     };
-    let axis = |label: &str| Axis {
-        label: label.into(),
-        scale: Scale::Linear,
-        from_zero: true,
-    };
     let svg = Chart {
         title: "Figure 4 (b): velocity factors of a generated motion".into(),
         caption: caption.clone(),
-        x: axis("frame"),
-        y: axis("velocity factor (cm/frame)"),
+        x: Axis::linear("frame"),
+        y: Axis::linear("velocity factor (cm/frame)"),
         lines: (0..PARTS).map(line).collect(),
     }
     .svg()?;
