@@ -4,10 +4,12 @@
 mod generated_data;
 #[path = "common/real_data.rs"]
 mod real_data;
+#[path = "common/trained_run.rs"]
+mod trained_run;
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
@@ -18,49 +20,11 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
 use tempfile::TempDir;
+use trained_run::{TrainedRun, keydance};
 
 const WEIGHTS: &str = "weights.safetensors";
-const INTERPOLATION: &str =
-    "name = 'interpolation'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'interpolation'\n";
-const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
-    [model]\nkind = 'pan2021'\nhidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n\
-    [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n[checkpoint]\nevery_steps = 5\n";
 
-/// A data folder, configs, and one small trained run.
-struct Fixture {
-    folder: TempDir,
-}
-
-impl Fixture {
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-}
-
-static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
-    let fixture = Fixture {
-        folder: TempDir::new().unwrap(),
-    };
-    fs::create_dir(fixture.path("data")).unwrap();
-    write_clips(&fixture.path("data"), 180, 3);
-    fs::write(fixture.path("interpolation.toml"), INTERPOLATION).unwrap();
-    fs::write(fixture.path("small.toml"), SMALL).unwrap();
-    keydance("train")
-        .arg(fixture.path("small.toml"))
-        .arg("--data")
-        .arg(fixture.path("data"))
-        .arg("--out")
-        .arg(fixture.path("run"))
-        .assert()
-        .success();
-    fixture
-});
-
-fn keydance(command: &str) -> Command {
-    let mut keydance = Command::cargo_bin("keydance").unwrap();
-    keydance.arg(command);
-    keydance
-}
+static FIXTURE: LazyLock<TrainedRun> = LazyLock::new(TrainedRun::new);
 
 /// `keydance evaluate SUBJECT` on the fixture's data.
 fn evaluate(subject: &Path) -> Command {
@@ -583,7 +547,7 @@ fn runs_are_listed_with_state_progress_speed_scores_and_version() {
     // What is no run.
     fs::create_dir_all(place("photographs/old")).unwrap();
     fs::write(place("photographs/notes.txt"), "no run").unwrap();
-    fs::write(place("experiment.toml"), SMALL).unwrap();
+    fs::copy(FIXTURE.path("small.toml"), place("experiment.toml")).unwrap();
 
     let lines = runs(folder.path());
     let first: Vec<&str> = lines.iter().map(|cells| cells[0].as_str()).collect();

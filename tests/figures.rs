@@ -2,6 +2,8 @@
 
 #[path = "common/generated_data.rs"]
 mod generated_data;
+#[path = "common/trained_run.rs"]
+mod trained_run;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +15,7 @@ use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use roxmltree::Document;
 use tempfile::TempDir;
+use trained_run::{TrainedRun, keydance};
 
 const FIGURES: [&str; 9] = [
     "figure_4b",
@@ -25,60 +28,30 @@ const FIGURES: [&str; 9] = [
     "figure_11",
     "figure_12",
 ];
-const INTERPOLATION: &str =
-    "name = 'interpolation'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'interpolation'\n";
 const ZERO_VELOCITY: &str =
     "name = 'zero_velocity'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'zero_velocity'\n";
-const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
-    [model]\nkind = 'pan2021'\nhidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n\
-    [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n";
 
-/// A data folder, a config of interpolation, a small trained run, and the figures of both.
-struct Fixture {
-    folder: TempDir,
-}
-
-impl Fixture {
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn figures(&self, run: &str, out: &str) -> Command {
-        let mut command = keydance("figures");
-        command
-            .arg(self.path(run))
-            .arg("--data")
-            .arg(self.path("data"));
-        command
-            .arg("--out")
-            .arg(self.path(out))
-            .args(["--length", "60"]);
-        command
-    }
-}
-
-static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
-    let fixture = Fixture {
-        folder: TempDir::new().unwrap(),
-    };
-    fs::create_dir(fixture.path("data")).unwrap();
-    write_clips(&fixture.path("data"), 180, 3);
-    fs::write(fixture.path("interpolation.toml"), INTERPOLATION).unwrap();
-    fs::write(fixture.path("small.toml"), SMALL).unwrap();
-    keydance("train")
-        .arg(fixture.path("small.toml"))
+/// `keydance figures` of a run or config of the fixture.
+fn figures(fixture: &TrainedRun, run: &str, out: &str) -> Command {
+    let mut command = keydance("figures");
+    command
+        .arg(fixture.path(run))
         .arg("--data")
-        .arg(fixture.path("data"))
+        .arg(fixture.path("data"));
+    command
         .arg("--out")
-        .arg(fixture.path("run"))
+        .arg(fixture.path(out))
+        .args(["--length", "60"]);
+    command
+}
+
+/// With the figures of interpolation and of the run.
+static FIXTURE: LazyLock<TrainedRun> = LazyLock::new(|| {
+    let fixture = TrainedRun::new();
+    figures(&fixture, "interpolation.toml", "plain")
         .assert()
         .success();
-    fixture
-        .figures("interpolation.toml", "plain")
-        .assert()
-        .success();
-    fixture
-        .figures("run", "trained")
+    figures(&fixture, "run", "trained")
         .arg("--compare")
         .arg(fixture.path("interpolation.toml"))
         .arg("--viewer")
@@ -87,12 +60,6 @@ static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
         .success();
     fixture
 });
-
-fn keydance(command: &str) -> Command {
-    let mut keydance = Command::cargo_bin("keydance").unwrap();
-    keydance.arg(command);
-    keydance
-}
 
 fn read(folder: &str, file: &str) -> String {
     fs::read_to_string(FIXTURE.path(folder).join(file)).unwrap()
@@ -250,7 +217,7 @@ fn compared_models_have_rows_of_their_own_and_interpolation_given_stands_there_o
 #[test]
 fn a_window_that_is_not_there_is_named_with_those_that_are() {
     let fails = |arguments: &[&str], words: &[&str]| {
-        let mut command = FIXTURE.figures("run", "never");
+        let mut command = figures(&FIXTURE, "run", "never");
         let assert = command.args(arguments).assert().failure();
         let text = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
         for word in words {
@@ -362,8 +329,7 @@ fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
 #[test]
 fn interpolation_stands_beside_the_other_models_without_training_too() {
     fs::write(FIXTURE.path("zero_velocity.toml"), ZERO_VELOCITY).unwrap();
-    FIXTURE
-        .figures("zero_velocity.toml", "still")
+    figures(&FIXTURE, "zero_velocity.toml", "still")
         .assert()
         .success();
     let rows = values("still", "figure_12", "LRP");

@@ -6,6 +6,8 @@ mod generated_data;
 mod martial_data;
 #[path = "common/real_data.rs"]
 mod real_data;
+#[path = "common/trained_run.rs"]
+mod trained_run;
 #[path = "common/viewer_page.rs"]
 mod viewer_page;
 
@@ -14,7 +16,6 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use generated_data::write_clips;
 use glam::DVec3;
 use keydance::data::{DanceClip, DataConfig};
 use keydance::motion::features::VELOCITY_FACTORS;
@@ -26,54 +27,18 @@ use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+use trained_run::{TrainedRun, keydance};
 use viewer_page::page_data;
 
-const INTERPOLATION: &str = "name = 'interpolation'\n[model]\nkind = 'interpolation'\n";
-const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
-    [model]\nkind = 'pan2021'\nhidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n\
-    [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n";
+static FIXTURE: LazyLock<TrainedRun> = LazyLock::new(TrainedRun::new);
 
-/// Six clips of 180 frames, a config of interpolation and a model that is hardly trained.
-struct Fixture {
-    folder: TempDir,
-    clips: Vec<PathBuf>,
-}
-
-impl Fixture {
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-}
-
-static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
-    let folder = TempDir::new().unwrap();
-    let data = folder.path().join("data");
-    fs::create_dir(&data).unwrap();
-    write_clips(&data, 180, 3);
-    let mut clips: Vec<PathBuf> = fs::read_dir(&data)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+/// The fixture's clips by name.
+static CLIPS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
+    let entries = fs::read_dir(FIXTURE.path("data")).unwrap();
+    let mut clips: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
     clips.sort();
-    let fixture = Fixture { folder, clips };
-    fs::write(fixture.path("interpolation.toml"), INTERPOLATION).unwrap();
-    fs::write(fixture.path("small.toml"), SMALL).unwrap();
-    keydance("train")
-        .arg(fixture.path("small.toml"))
-        .arg("--data")
-        .arg(&data)
-        .arg("--out")
-        .arg(fixture.path("run"))
-        .assert()
-        .success();
-    fixture
+    clips
 });
-
-fn keydance(command: &str) -> Command {
-    let mut keydance = Command::cargo_bin("keydance").unwrap();
-    keydance.arg(command);
-    keydance
-}
 
 /// `keydance generate` with a model of the fixture.
 fn generate(model: &str) -> Command {
@@ -85,7 +50,7 @@ fn generate(model: &str) -> Command {
 /// The same with frames 20, 80 and 140 of the first clip as keyframes.
 fn three_keyframes(model: &str) -> Command {
     let mut command = generate(model);
-    command.arg("--motion").arg(&FIXTURE.clips[0]);
+    command.arg("--motion").arg(&CLIPS[0]);
     command.args(["--keyframes", "20,80,140"]);
     command
 }
@@ -132,10 +97,7 @@ fn a_model_that_knows_nothing_still_passes_through_the_keyframes_in_the_files_ow
             contains("121 frames at 30.0000 a second")
                 .and(contains("keyframe at frame 60: the model missed it by")),
         );
-    let (result, source) = (
-        bvh::read(&file).unwrap(),
-        bvh::read(&FIXTURE.clips[0]).unwrap(),
-    );
+    let (result, source) = (bvh::read(&file).unwrap(), bvh::read(&CLIPS[0]).unwrap());
     assert_eq!(result.skeleton(), source.skeleton());
     assert_eq!(result.channels(), source.channels());
     assert_eq!(result.frame_time(), source.frame_time());
@@ -232,7 +194,7 @@ fn controls_combine() {
             "100,40",
         ])
         .arg("--velocity-from")
-        .arg(format!("{}:30", FIXTURE.clips[1].display()))
+        .arg(format!("{}:30", CLIPS[1].display()))
         .arg("--out")
         .arg(at("b.bvh"))
         .arg("--viewer")
@@ -244,7 +206,7 @@ fn controls_combine() {
     assert!(dance[0][0].distance(DVec3::new(-50.0, dance[0][0].y, 0.0)) < 1e-3);
     assert!(dance[140][0].distance(DVec3::new(50.0, dance[140][0].y, 0.0)) < 1e-3);
     let features = |clip: usize| {
-        let clip = read(&FIXTURE.clips[clip]);
+        let clip = read(&CLIPS[clip]);
         DanceClip::new(clip, None, &DataConfig::default()).unwrap()
     };
     let other = features(1).features;
@@ -276,7 +238,7 @@ fn keyframes_of_several_files_meet_in_one_dance() {
     let out = TempDir::new().unwrap();
     let file = out.path().join("dance.bvh");
     let keyframe = |clip: usize, frame: usize, time: usize| {
-        format!("{}:{frame}@{time}", FIXTURE.clips[clip].display())
+        format!("{}:{frame}@{time}", CLIPS[clip].display())
     };
     generate("run")
         .args([
@@ -293,7 +255,7 @@ fn keyframes_of_several_files_meet_in_one_dance() {
     let dance = world(&read(&file));
     assert_eq!(dance.len(), 121);
     for (clip, frame, time) in [(0, 70, 0), (1, 30, 50), (2, 0, 120)] {
-        let recorded = world(&read(&FIXTURE.clips[clip]));
+        let recorded = world(&read(&CLIPS[clip]));
         let off = farthest(&dance[time], &recorded[frame]);
         assert!(off < 0.01, "frame {time}: {off} cm");
     }
@@ -363,7 +325,7 @@ fn refused(mut command: Command, message: &str) {
 
 #[test]
 fn keyframes_that_cannot_be_used_are_named() {
-    let clip = FIXTURE.clips[0].display().to_string();
+    let clip = CLIPS[0].display().to_string();
     let with = |args: &[&str]| {
         let mut command = generate("interpolation.toml");
         command.args(args);
@@ -514,7 +476,7 @@ fn controls_that_cannot_be_used_are_named() {
         with(&["--velocity-csv", &factors, "--velocity-from", "a.bvh"]),
         "cannot be used with",
     );
-    let clip = FIXTURE.clips[1].display().to_string();
+    let clip = CLIPS[1].display().to_string();
     refused(
         with(&["--velocity-from", &format!("{clip}:100")]),
         "has 180 frames, the result needs velocity factors of 121",
@@ -542,7 +504,7 @@ fn controls_that_cannot_be_used_are_named() {
     command
         .arg(trained)
         .arg("--motion")
-        .arg(&FIXTURE.clips[0])
+        .arg(&CLIPS[0])
         .args(["--keyframes", "1,20"]);
     refused(command, "keydance train");
 }

@@ -1,5 +1,7 @@
 //! `keydance reproduce` through the binary: every row trained once, whatever stops it, and tables of what there is.
 
+#[path = "common/folders.rs"]
+mod folders;
 #[path = "common/generated_data.rs"]
 mod generated_data;
 
@@ -9,6 +11,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
+use folders::copy;
 use generated_data::write_clips;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
@@ -233,19 +236,6 @@ fn what_is_done_is_not_done_again_even_where_only_the_small_results_are_left() {
         fs::read(place.path().join("results/tables.md")).unwrap(),
         before
     );
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            copy(&path, &target);
-        } else {
-            fs::copy(&path, target).unwrap();
-        }
-    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Trainings that are stopped, killed or cannot write, through the binary: nothing is lost, and the end is the same to the bit.
 #![cfg(unix)]
 
+#[path = "common/folders.rs"]
+mod folders;
 #[path = "common/generated_data.rs"]
 mod generated_data;
 #[path = "common/small_run.rs"]
@@ -16,6 +18,7 @@ use std::sync::LazyLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use folders::copy;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -69,18 +72,6 @@ fn listed(folder: &Path) -> String {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().skip(1).collect::<Vec<_>>().join("\n")
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let to = to.join(entry.file_name());
-        if entry.file_type().unwrap().is_dir() {
-            copy(&entry.path(), &to);
-        } else {
-            fs::copy(entry.path(), to).unwrap();
-        }
-    }
 }
 
 /// Every file below a folder with its content.
