@@ -11,9 +11,8 @@ const NUGGET: f64 = 1e-6;
 
 /// Correlation of a number of p^b with itself `frames` later: `KEPT + (1 - KEPT) (1 + d) exp(-d)`, d = frames / TIME (Matern 3/2).
 ///
-/// Of training clips of the dance data at 30 frames a second: measured with the mean of all p^b, an estimate with it leaves 12.3, 60.4,
-/// 74.0 and 78.1 cm LRP at N = 10, 50, 100 and 150 on clips set aside; with the measured correlations 12.3, 61.7, 74.6 and 78.7 (of each
-/// number its own: 12.2, 60.4, 73.5 and 77.7); lines between the keyframes 15.0, 64.4, 81.7 and 87.7.
+/// On training clips of the dance data (30 frames a second) that are set aside, an estimate with it is within an LRP of 12.3, 60.2, 73.2 and
+/// 76.5 cm at N = 10, 50, 100 and 150, lines between the keyframes within 16.7, 64.4, 81.0 and 86.3 (`scripts/study_poses.py`).
 fn likeness(frames: usize) -> f64 {
     let d = frames as f64 / TIME;
     KEPT + (1.0 - KEPT) * (1.0 + d) * (-d).exp()
