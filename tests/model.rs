@@ -674,15 +674,35 @@ fn each_output_of_the_decoders_is_its_number_of_the_frame() {
     }
 }
 
+/// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least expected square error, where numbers d
+/// frames apart correlate by r(d) of `docs/model.md`.
+fn estimate(t: usize, n: usize) -> [f64; 3] {
+    let r = |d: usize| 0.2 + 0.8 * (1.0 + d as f64 / 8.0) * (-(d as f64) / 8.0).exp();
+    let step = |d: usize| r(d) - r(d + 1);
+    let given = [
+        [1.0 + 1e-6, step(0), r(n)],
+        [step(0), (2.0 + 1e-6) * step(0), step(n)],
+        [r(n), step(n), 1.0 + 1e-6],
+    ];
+    let likely = glam::DVec3::new(r(t), step(t), r(n - t));
+    (glam::DMat3::from_cols_array_2d(&given).inverse() * likely).to_array()
+}
+
 #[test]
-fn a_residual_of_nothing_is_the_line_between_the_keyframes_on_the_given_trajectory() {
-    let (features, standardisation) = generated_windows(8, 2, 13).unwrap();
+fn a_residual_of_nothing_is_the_best_linear_estimate_on_the_given_trajectory() {
+    let (features, statistics) = generated_windows(8, 2, 13).unwrap();
+    let std = &statistics.std;
+    // From a velocity of p^b or p^r, standardised, to deviations of the position a frame, and back.
+    let speed =
+        |column: usize, v: f64| (v * std[77 + column] + statistics.mean[77 + column]) / std[column];
+    let velocity =
+        |column: usize, s: f64| (s * std[column] - statistics.mean[77 + column]) / std[77 + column];
     for decoders in [1, 2] {
         let config = Pan2021Config {
             decoders,
             ..residual().small()
         };
-        let mut built: Built<f64> = build(&config, &standardisation);
+        let mut built: Built<f64> = build(&config, &statistics);
         for (name, value) in built.parameters.values_mut() {
             if name.contains("decoder.4") {
                 value.fill(0.0);
@@ -690,14 +710,40 @@ fn a_residual_of_nothing_is_the_line_between_the_keyframes_on_the_given_trajecto
         }
         let predicted = predict(&built, &features);
         for ((t, window, column), found) in predicted.indexed_iter() {
-            let between = |row: usize| features[[row, window, column]];
-            let share = (t + 1) as f64 / 8.0;
-            let expected = match column {
-                0..69 | 72 => between(0) + share * (between(8) - between(0)),
-                69..72 => between(t + 1),
-                _ => 0.0,
+            let given = |row: usize, column: usize| features[[row, window, column]];
+            let place = |t: usize, column: usize| match column {
+                0..69 => {
+                    let [first, moving, last] = estimate(t, 8);
+                    let speed = speed(column, given(0, 77 + column));
+                    first * given(0, column) + moving * speed + last * given(8, column)
+                }
+                _ => given(t, column),
             };
-            assert!((found - expected).abs() < 1e-12, "{t} {column}");
+            let expected = match column {
+                0..72 => place(t + 1, column),
+                72 => given(0, 72) + (t + 1) as f64 / 8.0 * (given(8, 72) - given(0, 72)),
+                73..77 => 0.0,
+                _ => {
+                    let column = column - 77;
+                    velocity(column, place(t + 1, column) - place(t, column))
+                }
+            };
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{t} {column}: {found}, {expected}"
+            );
+        }
+        // At k2 nothing is open: whatever the weights, p^b is the keyframe's and p^r the trajectory's.
+        let mut built: Built<f64> = build(&config, &statistics);
+        for (_, value) in built.parameters.values_mut() {
+            value.mapv_inplace(|x| 2.0 * x);
+        }
+        let predicted = predict(&built, &features);
+        for window in 0..2 {
+            for column in 0..72 {
+                let missed = predicted[[7, window, column]] - features[[8, window, column]];
+                assert!(missed.abs() < 1e-2, "{column}: {missed}");
+            }
         }
     }
 }
