@@ -570,7 +570,7 @@ fn the_budget_goes_over_every_config_of_the_paper_and_leaves_its_model() {
         let plain = ExperimentConfig::load(&file, &[]).unwrap();
         let config = ExperimentConfig::load_under(&file, Some(&budget), &[]).unwrap();
         assert_eq!((&config.name, &config.model), (&plain.name, &plain.model));
-        assert_eq!(config.schedule.batch_size, 32, "{}", file.display());
+        assert_eq!(config.schedule.batch_size, 16, "{}", file.display());
     }
 }
 
