@@ -18,54 +18,22 @@ fn likeness(frames: usize) -> f64 {
     KEPT + (1.0 - KEPT) * (1.0 + d) * (-d).exp()
 }
 
-/// The estimate of frame k1 + t, and what it leaves open.
+/// Estimates of the frames of a transition, and what they leave open.
 ///
-/// It is linear in p^b and v^b of k1 and p^b of k2, as differences from their means, with the least expected square error (kriging) where
-/// all numbers correlate as [`likeness`] says and a velocity is the difference to the frame before: near the keyframes the motion goes
-/// on smoothly, far from both it is the mean.
+/// They are linear in p^b and v^b of k1 and p^b of k2, as differences from their means, with the least expected square error (kriging)
+/// where all numbers correlate as [`likeness`] says and a velocity is the difference to the frame before: near the keyframes the
+/// motion goes on smoothly, far from both it is the mean.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Estimate {
-    /// Of p^b of k1, v^b of k1 (in deviations of p^b a frame) and p^b of k2.
-    pub weights: [f64; 3],
-    /// Standard deviation of the error of p^b, in deviations of p^b: 0 in the keyframes, near 1 far from them.
-    pub deviation: f64,
-    /// That of the step from frame t - 1, as a share of the deviation of all steps; 0 for t = 0.
-    pub step_deviation: f64,
-}
-
-impl Estimate {
-    /// `t` at most N = `transition`.
-    pub fn new(t: usize, transition: usize) -> Self {
-        let given = Given::new(transition);
-        let likely = given.likeness(t);
-        let weights = given.inverse * likely;
-        let step = if t == 0 {
-            DVec3::ZERO
-        } else {
-            likely - given.likeness(t - 1)
-        };
-        let left = |all: f64, likely: DVec3| {
-            let known = likely.dot(given.inverse * likely);
-            (1.0 - known / all).max(0.0).sqrt()
-        };
-        let all_steps = 2.0 * (1.0 - likeness(1));
-        Self {
-            weights: weights.to_array(),
-            deviation: left(1.0, likely),
-            step_deviation: if t == 0 { 0.0 } else { left(all_steps, step) },
-        }
-    }
-}
-
-/// p^b and v^b of k1 and p^b of k2.
-struct Given {
+pub(super) struct Estimator {
+    /// N
     transition: usize,
-    /// Of their covariances.
+    /// Of the covariances of p^b and v^b of k1 and p^b of k2.
     inverse: DMat3,
 }
 
-impl Given {
-    fn new(transition: usize) -> Self {
+impl Estimator {
+    /// For transitions of N = `transition` frames.
+    pub fn new(transition: usize) -> Self {
         let last = likeness(transition);
         let covariances = [
             [1.0 + NUGGET, step(0), last],
@@ -78,9 +46,31 @@ impl Given {
         }
     }
 
-    /// Covariances with p^b of frame t.
-    fn likeness(&self, t: usize) -> DVec3 {
+    /// Weights of p^b of k1, v^b of k1 (in deviations of p^b a frame) and p^b of k2 in the estimate of frame k1 + `t`, `t` at most N.
+    pub fn weights(&self, t: usize) -> [f64; 3] {
+        (self.inverse * self.covariances(t)).to_array()
+    }
+
+    /// Standard deviation of the error of p^b in frame k1 + `t`, in deviations of p^b: 0 in the keyframes, near 1 far from them.
+    pub fn deviation(&self, t: usize) -> f64 {
+        self.left(1.0, self.covariances(t))
+    }
+
+    /// That of the step to frame k1 + `t` from the one before, as a share of the deviation of all steps; `t` from 1.
+    pub fn step_deviation(&self, t: usize) -> f64 {
+        let step = self.covariances(t) - self.covariances(t - 1);
+        self.left(2.0 * (1.0 - likeness(1)), step)
+    }
+
+    /// Covariances of what is given with p^b of frame k1 + `t`.
+    fn covariances(&self, t: usize) -> DVec3 {
         DVec3::new(likeness(t), step(t), likeness(self.transition - t))
+    }
+
+    /// What is left of the deviation of a number of this variance and these covariances with what is given, as a share.
+    fn left(&self, variance: f64, covariances: DVec3) -> f64 {
+        let known = covariances.dot(self.inverse * covariances);
+        (1.0 - known / variance).max(0.0).sqrt()
     }
 }
 
@@ -97,7 +87,7 @@ mod tests {
     fn a_keyframe_is_estimated_by_itself() {
         for n in [1, 2, 10, 150, 1000] {
             for (t, expected) in [(0, [1.0, 0.0, 0.0]), (n, [0.0, 0.0, 1.0])] {
-                for (weight, expected) in Estimate::new(t, n).weights.into_iter().zip(expected) {
+                for (weight, expected) in Estimator::new(n).weights(t).into_iter().zip(expected) {
                     assert!(
                         (weight - expected).abs() < 1e-2,
                         "N = {n}, t = {t}: {weight}"
@@ -109,7 +99,7 @@ mod tests {
 
     #[test]
     fn far_from_both_keyframes_little_is_left_of_them() {
-        let [first, velocity, last] = Estimate::new(500, 1000).weights;
+        let [first, velocity, last] = Estimator::new(1000).weights(500);
         // KEPT from two poses that share it; of the first one two frames are known, and count together.
         for weight in [first, last, -2.0 * velocity] {
             assert!((weight - KEPT / (1.0 + KEPT)).abs() < 2e-3, "{weight}");
@@ -120,10 +110,10 @@ mod tests {
     fn what_is_open_is_nothing_in_the_keyframes_and_nearly_all_far_from_them() {
         for n in [1, 2, 10, 150] {
             for t in [0, n] {
-                let open = Estimate::new(t, n).deviation;
+                let open = Estimator::new(n).deviation(t);
                 assert!(open < 2e-3, "N = {n}, t = {t}: {open}");
             }
-            let open: Vec<f64> = (0..=n).map(|t| Estimate::new(t, n).deviation).collect();
+            let open: Vec<f64> = (0..=n).map(|t| Estimator::new(n).deviation(t)).collect();
             assert!(
                 open.iter().all(|open| (0.0..1.0).contains(open)),
                 "{open:?}"
@@ -132,18 +122,16 @@ mod tests {
             let turns = open.windows(3).filter(|o| o[1] > o[0] && o[1] >= o[2]);
             assert!(turns.count() <= 1, "{open:?}");
         }
-        let far = Estimate::new(75, 150);
-        assert!(far.deviation > 0.9 && far.step_deviation > 0.99, "{far:?}");
-        let near = Estimate::new(1, 150);
-        assert!(
-            near.deviation < 0.1 && near.step_deviation < 0.6,
-            "{near:?}"
-        );
+        let long = Estimator::new(150);
+        let open = |t: usize| (long.deviation(t), long.step_deviation(t));
+        let (far, near) = (open(75), open(1));
+        assert!(far.0 > 0.9 && far.1 > 0.99, "{far:?}");
+        assert!(near.0 < 0.1 && near.1 < 0.6, "{near:?}");
     }
 
     #[test]
     fn the_estimate_goes_on_with_the_first_keyframes_velocity() {
-        let [first, velocity, last] = Estimate::new(1, 100).weights;
+        let [first, velocity, last] = Estimator::new(100).weights(1);
         assert!((first - 1.0).abs() < 0.02, "{first}");
         assert!((0.8..1.0).contains(&velocity), "{velocity}");
         assert!(last.abs() < 0.01, "{last}");

@@ -5,7 +5,7 @@ use rand::Rng;
 
 use super::config::{Output, Pan2021Config};
 use super::controller::{Controller, Session, Trajectory};
-use super::guess::Estimate;
+use super::guess::Estimator;
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
@@ -172,6 +172,7 @@ impl Pan2021 {
             values,
             windows,
             transition: frames - 1,
+            estimator: Estimator::new(frames - 1),
             target_code,
             states,
             root,
@@ -208,6 +209,7 @@ struct Rollout<'n, 'f, T> {
     windows: usize,
     /// N
     transition: usize,
+    estimator: Estimator,
     target_code: Var,
     states: Vec<Var>,
     root: Session<'n, T>,
@@ -340,19 +342,18 @@ impl<T: Real> Rollout<'_, '_, T> {
     /// What a residual is multiplied with in frame t + 1, `[149]`: what the estimate of p^b leaves open, of p^r and o^r the same share;
     /// of the velocities what that of v^b does; 1 for c.
     fn open(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
-        let estimate = Estimate::new(t + 1, self.transition);
         tape.constant_with(&[FRAME], |out| {
-            out.fill(T::from_f64(estimate.deviation));
+            out.fill(T::from_f64(self.estimator.deviation(t + 1)));
             out[CONTACTS].fill(T::one());
-            out[VELOCITIES].fill(T::from_f64(estimate.step_deviation));
+            out[VELOCITIES].fill(T::from_f64(self.estimator.step_deviation(t + 1)));
         })
     }
 
-    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`Estimate`] has it, p^r of the given
+    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`Estimator`] has it, p^r of the given
     /// trajectory, o^r linearly between the keyframes; v^b and v^r the differences of these p^b and p^r; c 0, their means.
     fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         let (units, n) = (&self.network.units, self.transition);
-        let weights = [t, t + 1].map(|t| Estimate::new(t, n).weights.map(T::from_f64));
+        let weights = [t, t + 1].map(|t| self.estimator.weights(t).map(T::from_f64));
         let share = T::from_f64((t + 1) as f64 / n as f64);
         let frame = |index: usize| {
             self.values[index * self.windows * FEATURES..(index + 1) * self.windows * FEATURES]
@@ -364,8 +365,7 @@ impl<T: Real> Rollout<'_, '_, T> {
             for (out, ((first, last), (before, now))) in
                 out.chunks_exact_mut(FRAME).zip(ends.zip(given))
             {
-                let places = out.split_at_mut(VELOCITIES.start);
-                let (places, velocities) = places;
+                let (places, velocities) = out.split_at_mut(VELOCITIES.start);
                 for (column, velocity) in (0..).zip(velocities) {
                     let speed = units.speed(column, first[VELOCITIES.start + column]);
                     let [earlier, place] = match BODY_POSITIONS.contains(&column) {
