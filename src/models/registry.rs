@@ -63,7 +63,7 @@ impl ModelConfig {
         }
     }
 
-    /// Where the windows that the network reads have the origin of their root positions.
+    /// The frame of reference of the root's numbers in the windows that the network reads.
     pub fn root_frame(&self) -> RootFrame {
         match self {
             Self::Pan2021(config) => config.root_frame,

@@ -69,7 +69,8 @@ pub struct ScheduleConfig {
     pub batch_size: usize,
     /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not on the number of threads.
     pub shards: usize,
-    /// Share of the schedule that is trained, above 0 and at most 1: a random share of the windows of every length of every epoch.
+    /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths of every epoch, below 1 in whole
+    /// batches, see [`super::Schedule::new`].
     pub fraction: f64,
 }
 
