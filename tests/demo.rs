@@ -72,7 +72,7 @@ fn a_demo_takes_the_place_of_an_earlier_one_whether_ahead_or_behind() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("demo");
     // Hardly trained.
-    let digests = ["0.0004", "0.0002"].map(|fraction| {
+    let digests = ["0.004", "0.002"].map(|fraction| {
         let ended = demo(&out).args(["--fraction", fraction]).output().unwrap();
         assert!([Some(0), Some(4)].contains(&ended.status.code()));
         let manifest = json(&out.join("manifest.json"));

@@ -377,7 +377,7 @@ fn rows_that_could_not_be_trained_are_refused_before_any_is() {
             "validation.lengths has 4000",
         ),
         ("model.lstms=2", "interpolation.toml is no row"),
-        ("schedule.fraction=1e-9", "the schedule has no step"),
+        ("schedule.batch_size=8192", "the schedule has no step"),
     ] {
         let refused = reproduce(place.path()).args(["--set", set]).assert();
         refused.failure().stderr(contains(words));

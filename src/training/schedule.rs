@@ -45,7 +45,7 @@ impl Schedule {
     /// Counts the schedule for training clips of these numbers of frames.
     ///
     /// With a `fraction` below 1 whole batches are dealt: the windows due of a length that fill none go to the next length, so that a
-    /// small share has steps of `batch_size` windows as any other; what is left at the end is the last length's.
+    /// small share has steps of `batch_size` windows as any other, and the total is right to one batch.
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
         let mut schedule = Self {
             clip_frames: clip_frames.to_vec(),
@@ -66,7 +66,6 @@ impl Schedule {
             .collect();
         let growth = config.max_len.saturating_sub(config.min_len);
         let epochs = growth.div_ceil(config.max_len_step.max(1)) + 1;
-        let last_length = available.iter().rposition(|&n| n > 0);
         let (mut all, mut taken, mut steps) = (0usize, 0usize, 0u64);
         for epoch in 0..epochs {
             let longest = (config.min_len + config.max_len_step * epoch).min(config.max_len);
@@ -84,11 +83,10 @@ impl Schedule {
                 }
                 all += n;
                 let due = (all as f64 * config.fraction).floor() as usize - taken;
-                let ends = epoch + 1 == epochs && Some(length) == last_length;
-                let count = if config.fraction < 1.0 && !ends {
+                let count = if config.fraction < 1.0 {
                     (due - due % schedule.batch_size).min(n)
                 } else {
-                    due.min(n)
+                    due
                 };
                 taken += count;
                 schedule.frame_steps += (count * length) as u64;
@@ -181,7 +179,7 @@ pub(super) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::collections::{BTreeMap, HashSet};
+    use std::collections::{HashMap, HashSet};
 
     fn schedule(frames: &[usize], config: &ScheduleConfig, seed: u64) -> Schedule {
         Schedule::new(frames, config, Streams::new(seed))
@@ -296,20 +294,18 @@ mod tests {
             let trained = |config: &ScheduleConfig| {
                 let schedule = schedule(&frames, config, 5);
                 let batches: Vec<_> = (0..schedule.epochs()).map(|e| schedule.epoch(e)).collect();
-                let ended = batches.iter().rposition(|epoch| !epoch.is_empty());
-                for (index, epoch) in batches.iter().enumerate() {
-                    let mut of_length: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+                for epoch in &batches {
+                    let mut of_length: HashMap<usize, Vec<usize>> = HashMap::new();
                     for batch in epoch {
                         of_length.entry(batch.length).or_default().push(batch.windows.len());
                     }
-                    let last = of_length.keys().last().copied().filter(|_| Some(index) == ended);
                     for (length, sizes) in of_length {
                         let all = windows(&frames, length).windows.len();
                         let full = sizes.iter().all(|&size| size == config.batch_size);
-                        let whole = full || sizes.iter().sum::<usize>() == all;
-                        assert!(whole || Some(length) == last, "{sizes:?} of {all}");
+                        assert!(full || sizes.iter().sum::<usize>() == all, "{sizes:?} of {all}");
                     }
                 }
+                assert_eq!(batches.iter().map(Vec::len).sum::<usize>() as u64, schedule.steps());
                 for epoch in &batches {
                     let windows: Vec<_> = epoch.iter().flat_map(|b| b.windows.iter().map(|w| (b.length, w.clip, w.start))).collect();
                     assert_eq!(windows.iter().collect::<HashSet<_>>().len(), windows.len());
@@ -320,13 +316,7 @@ mod tests {
             prop_assert_eq!(all(&part), schedule(&frames, &config, 5).frame_steps());
             let (whole, part) = (trained(&config), trained(&part));
             let due = (whole as f64 * fraction).floor() as usize;
-            let at_the_end = windows(&frames, config.max_len).windows.len();
-            // All but those that the last length has no windows for.
-            let left = due - part;
-            prop_assert!(left < config.batch_size, "{} of {}", part, due);
-            if at_the_end > 0 && (fraction <= 0.5 && at_the_end >= 2 * config.batch_size || part == 0) {
-                prop_assert_eq!(left, 0);
-            }
+            prop_assert!(part <= due && due - part < config.batch_size, "{} of {}", part, due);
         }
 
         #[test]
