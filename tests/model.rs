@@ -16,7 +16,7 @@ use keydance::models::{
 use keydance::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
 use keydance::nn::Initialiser;
 use ndarray::{Array2, Array3, ArrayView1, Axis, s};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 type Shapes = BTreeMap<String, Vec<usize>>;
@@ -83,6 +83,17 @@ fn build<T: Real>(config: &Pan2021Config, standardisation: &Standardisation) -> 
     Built {
         network,
         parameters,
+    }
+}
+
+impl<T: Real> Built<T> {
+    /// As after some training: no weight stands at a special value, such as the zeros that a residual network begins with.
+    fn disturbed(mut self) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for (_, value) in self.parameters.values_mut() {
+            value.mapv_inplace(|x| x + T::from_f64(rng.random_range(-0.1..0.1)));
+        }
+        self
     }
 }
 
@@ -441,7 +452,7 @@ fn windows_predicted_together_are_those_predicted_one_by_one() {
     for (windows, chunk) in [(5, 1), (5, 3), (40, 40), (40, 3)] {
         let (features, standardisation) = generated_windows(9, windows, 11).unwrap();
         for config in networks() {
-            let built: Built<f64> = build(&config, &standardisation);
+            let built: Built<f64> = build(&config, &standardisation).disturbed();
             let together = predict(&built, &features);
             let parts: Vec<Array3<f64>> = features
                 .axis_chunks_iter(Axis(1), chunk)
@@ -458,7 +469,7 @@ fn windows_predicted_together_are_those_predicted_one_by_one() {
 fn a_prediction_reads_only_what_is_given() {
     let (features, standardisation) = generated_windows(9, 3, 13).unwrap();
     for config in networks() {
-        let built: Built<f64> = build(&config, &standardisation);
+        let built: Built<f64> = build(&config, &standardisation).disturbed();
         let before = predict(&built, &features);
         let mut unread = features.clone();
         // Between the keyframes the root trajectory (69..72) and the velocity factors (149..154) are given, of k2 the pose too.
@@ -474,7 +485,7 @@ fn a_prediction_reads_only_what_is_given() {
 fn a_prediction_follows_everything_that_is_given() {
     let (features, standardisation) = generated_windows(9, 3, 13).unwrap();
     for config in networks() {
-        let built: Built<f64> = build(&config, &standardisation);
+        let built: Built<f64> = build(&config, &standardisation).disturbed();
         let before = predict(&built, &features);
         for (what, row, column) in [
             ("pose of k1", 0, 10),
@@ -506,7 +517,7 @@ fn a_prediction_follows_everything_that_is_given() {
 fn predictions_are_the_frames_whose_losses_training_takes() {
     let (features, standardisation) = generated_windows(12, 3, 17).unwrap();
     for config in networks() {
-        let built: Built<f64> = build(&config, &standardisation);
+        let built: Built<f64> = build(&config, &standardisation).disturbed();
         let predicted = predict(&built, &features);
         let truth = features.slice(s![1.., .., ..FRAME]);
         let squares: f64 = (&predicted - &truth).mapv(|x| x * x).sum();
@@ -689,7 +700,7 @@ fn estimate(t: usize, n: usize) -> [f64; 3] {
 }
 
 #[test]
-fn a_residual_of_nothing_is_the_best_linear_estimate_on_the_given_trajectory() {
+fn an_untrained_residual_network_is_the_best_linear_estimate_on_the_given_trajectory() {
     let (features, statistics) = generated_windows(8, 2, 13).unwrap();
     let std = &statistics.std;
     // From a velocity of p^b or p^r, standardised, to deviations of the position a frame, and back.
@@ -702,13 +713,7 @@ fn a_residual_of_nothing_is_the_best_linear_estimate_on_the_given_trajectory() {
             decoders,
             ..residual().small()
         };
-        let mut built: Built<f64> = build(&config, &statistics);
-        for (name, value) in built.parameters.values_mut() {
-            if name.contains("decoder.4") {
-                value.fill(0.0);
-            }
-        }
-        let predicted = predict(&built, &features);
+        let predicted = predict(&build(&config, &statistics), &features);
         for ((t, window, column), found) in predicted.indexed_iter() {
             let given = |row: usize, column: usize| features[[row, window, column]];
             let place = |t: usize, column: usize| match column {
@@ -734,10 +739,7 @@ fn a_residual_of_nothing_is_the_best_linear_estimate_on_the_given_trajectory() {
             );
         }
         // At k2 nothing is open: whatever the weights, p^b is the keyframe's and p^r the trajectory's.
-        let mut built: Built<f64> = build(&config, &statistics);
-        for (_, value) in built.parameters.values_mut() {
-            value.mapv_inplace(|x| 2.0 * x);
-        }
+        let built: Built<f64> = build(&config, &statistics).disturbed();
         let predicted = predict(&built, &features);
         for window in 0..2 {
             for column in 0..72 {
@@ -817,7 +819,7 @@ fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction
             root_frame,
             ..residual().small()
         };
-        let built: Built<f32> = build(&config, &standardisation);
+        let built: Built<f32> = build(&config, &standardisation).disturbed();
         let model = TrainedModel::new(
             "small".into(),
             Box::new(built.network) as Box<dyn Network<f32>>,

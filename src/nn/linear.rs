@@ -29,6 +29,21 @@ impl Linear {
         }
     }
 
+    /// [`Linear::new`], with 0 for every weight: whatever goes in, 0 comes out until it is trained.
+    pub fn of_zeros<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        inputs: usize,
+        outputs: usize,
+    ) -> Self {
+        Self {
+            weight: init
+                .constant(format!("{name}.weight"), &[outputs, inputs], 0.0)
+                .1,
+            bias: init.constant(format!("{name}.bias"), &[outputs], 0.0).1,
+        }
+    }
+
     /// `[.., in]` -> `[.., out]`.
     ///
     /// # Errors

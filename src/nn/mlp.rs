@@ -17,6 +17,17 @@ pub enum Activation {
     Relu,
 }
 
+/// What an [`Mlp`]'s last layer is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LastLayer {
+    /// A layer like the others, with its activation.
+    Activated,
+    /// Without activation: its numbers may be any.
+    Linear,
+    /// The same, of zeros at first: the whole gives 0 until it is trained.
+    Zero,
+}
+
 /// Linear, activation, Linear, activation, ..; named as a `torch.nn.Sequential` names them: `{name}.0`, `{name}.1`, ..
 #[derive(Debug, Clone)]
 pub struct Mlp {
@@ -38,27 +49,32 @@ impl Mlp {
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: &[usize],
-        activate_last: bool,
+        last: LastLayer,
     ) -> Self {
-        Self::with_activation(init, name, sizes, Activation::Prelu, activate_last)
+        Self::with_activation(init, name, sizes, Activation::Prelu, last)
     }
 
-    /// Layers from `sizes[0]` to `sizes[1]` to ..; the last one has an activation of its own where `activate_last` says so.
+    /// Layers from `sizes[0]` to `sizes[1]` to ..
     pub fn with_activation<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: &[usize],
         activation: Activation,
-        activate_last: bool,
+        last: LastLayer,
     ) -> Self {
-        let last = sizes.len().saturating_sub(2);
+        let end = sizes.len().saturating_sub(2);
         let layers = sizes
             .windows(2)
             .enumerate()
             .map(|(k, pair)| {
-                let linear = Linear::new(init, &format!("{name}.{}", 2 * k), pair[0], pair[1]);
+                let layer = format!("{name}.{}", 2 * k);
+                let last = if k == end { last } else { LastLayer::Activated };
+                let linear = match last {
+                    LastLayer::Zero => Linear::of_zeros(init, &layer, pair[0], pair[1]),
+                    _ => Linear::new(init, &layer, pair[0], pair[1]),
+                };
                 let step = match activation {
-                    _ if k == last && !activate_last => Step::Identity,
+                    _ if last != LastLayer::Activated => Step::Identity,
                     Activation::Plu => Step::Plu,
                     Activation::Relu => Step::Relu,
                     Activation::Prelu => {

@@ -14,7 +14,7 @@ pub use attention::{MultiHeadAttention, NarrowAttention};
 pub use init::{Initialiser, MOST_WEIGHTS};
 pub use linear::Linear;
 pub use lstm::Lstm;
-pub use mlp::{Activation, Mlp};
+pub use mlp::{Activation, LastLayer, Mlp};
 pub use norm::LayerNorm;
 pub use positions::sinusoidal_positions;
 pub use transformer::{TransformerDecoderLayer, TransformerEncoderLayer, TransformerSizes};

@@ -5,7 +5,7 @@ use rand::Rng;
 use super::config::Harvey2020Config;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::network::CRITICS;
-use crate::nn::{Activation, Initialiser, Mlp};
+use crate::nn::{Activation, Initialiser, LastLayer, Mlp};
 
 /// Numbers of a frame that a critic sees: 23 joints relative to the root and the velocities of all 24.
 pub(super) const SEEN: usize = 69 + 72;
@@ -38,7 +38,8 @@ impl Critic {
             .map(|&(name, frames)| {
                 let sizes = [frames * SEEN, config.hidden, config.code, 1];
                 let name = format!("{CRITICS}{name}");
-                let layers = Mlp::with_activation(init, &name, &sizes, Activation::Relu, false);
+                let layers =
+                    Mlp::with_activation(init, &name, &sizes, Activation::Relu, LastLayer::Linear);
                 Self { frames, layers }
             })
             .collect()

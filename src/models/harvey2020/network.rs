@@ -15,7 +15,7 @@ use crate::models::posed_frames::posed_frames;
 use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
 use crate::motion::JOINTS;
 use crate::motion::features::{BODY_VELOCITIES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
-use crate::nn::{Activation, Initialiser, Lstm, Mlp, sinusoidal_positions};
+use crate::nn::{Activation, Initialiser, LastLayer, Lstm, Mlp, sinusoidal_positions};
 
 /// Rotations, root velocity, contacts: the state encoder's input, and what the decoder gives (as changes, for the rotations).
 const STATE: usize = ROTATIONS + 3 + 4;
@@ -71,15 +71,27 @@ impl Harvey2020 {
     ) -> Result<Self, ModelError> {
         config.check()?;
         let (wide, code, recurrent) = (config.hidden, config.code, config.recurrent);
-        let mut layers = |name: &str, sizes: &[usize], activate_last: bool| {
-            Mlp::with_activation(init, name, sizes, Activation::Plu, activate_last)
+        let mut layers = |name: &str, sizes: &[usize], last: LastLayer| {
+            Mlp::with_activation(init, name, sizes, Activation::Plu, last)
         };
-        let state_encoder = layers("state_encoder", &[STATE, wide, code], true);
-        let offset_encoder = layers("offset_encoder", &[OFFSET, wide, code], true);
-        let target_encoder = layers("target_encoder", &[ROTATIONS, wide, code], true);
+        let state_encoder = layers("state_encoder", &[STATE, wide, code], LastLayer::Activated);
+        let offset_encoder = layers(
+            "offset_encoder",
+            &[OFFSET, wide, code],
+            LastLayer::Activated,
+        );
+        let target_encoder = layers(
+            "target_encoder",
+            &[ROTATIONS, wide, code],
+            LastLayer::Activated,
+        );
         let first = [STATE + BODY_VELOCITIES.len(), wide, 2 * recurrent];
-        let initial_state = layers("initial_state", &first, false);
-        let decoder = layers("decoder", &[recurrent, wide, code, STATE], false);
+        let initial_state = layers("initial_state", &first, LastLayer::Linear);
+        let decoder = layers(
+            "decoder",
+            &[recurrent, wide, code, STATE],
+            LastLayer::Linear,
+        );
         let lstm = Lstm::new(init, "lstm", 3 * code, recurrent);
         let critics = match config.adversarial {
             true => Critic::both(init, config),

@@ -22,7 +22,8 @@ pub enum Controllers {
 pub enum Output {
     /// The frame itself, as in the paper.
     Absolute,
-    /// What is added to the best linear estimate from the keyframes, and to the given trajectory. So an untrained network is near these.
+    /// What is added to the best linear estimate from the keyframes, and to the given trajectory. An untrained
+    /// network gives just these.
     Residual,
 }
 

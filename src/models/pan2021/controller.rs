@@ -14,8 +14,8 @@ use super::config::{Controllers, Pan2021Config};
 use super::units::constant;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::nn::{
-    Initialiser, Linear, Mlp, MultiHeadAttention, NarrowAttention, TransformerDecoderLayer,
-    TransformerEncoderLayer, sinusoidal_positions,
+    Initialiser, LastLayer, Linear, Mlp, MultiHeadAttention, NarrowAttention,
+    TransformerDecoderLayer, TransformerEncoderLayer, sinusoidal_positions,
 };
 
 /// Windows coded at once where few are asked for: products with few rows are slow.
@@ -112,9 +112,12 @@ impl Controller {
     ) -> Self {
         let (d, window) = (config.code, config.window);
         let kind = match config.controllers {
-            Controllers::FullyConnected => {
-                Kind::FullyConnected(Mlp::new(init, name, &[2 * window * channels, d, d], true))
-            }
+            Controllers::FullyConnected => Kind::FullyConnected(Mlp::new(
+                init,
+                name,
+                &[2 * window * channels, d, d],
+                LastLayer::Activated,
+            )),
             Controllers::Transformer => {
                 let sizes = config.transformer();
                 let projection = |init: &mut Initialiser<'_, T, R>, kind: &str| {

@@ -14,7 +14,7 @@ use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
 use crate::motion::features::{
     BODY_POSITIONS, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
-use crate::nn::{Initialiser, Lstm, Mlp};
+use crate::nn::{Initialiser, LastLayer, Lstm, Mlp};
 
 /// Numbers of the state encoder's input: p^b, p^r, o^r, c.
 const STATE: std::ops::Range<usize> = 0..77;
@@ -70,25 +70,35 @@ impl Pan2021 {
     ) -> Result<Self, ModelError> {
         config.check()?;
         let (wide, code) = (config.hidden, config.code);
-        let state_encoder = Mlp::new(init, "state_encoder", &[STATE.len(), wide, code], true);
+        let state_encoder = Mlp::new(
+            init,
+            "state_encoder",
+            &[STATE.len(), wide, code],
+            LastLayer::Activated,
+        );
         let velocity_encoder = Mlp::new(
             init,
             "velocity_encoder",
             &[VELOCITIES.len(), wide, code],
-            true,
+            LastLayer::Activated,
         );
         let target_controller = Mlp::new(
             init,
             "target_controller",
             &[KEYFRAME.len(), wide, code],
-            true,
+            LastLayer::Activated,
         );
         let codes = if config.velocity_factor { 4 } else { 3 };
         let last_input = match config.lstms {
             1 => (codes + 1) * code,
             _ => 2 * code,
         };
-        let position_encoder = Mlp::new(init, "position_encoder", &[4, last_input], true);
+        let position_encoder = Mlp::new(
+            init,
+            "position_encoder",
+            &[4, last_input],
+            LastLayer::Activated,
+        );
         let root_trajectory_controller =
             Controller::new(init, "root_trajectory_controller", 3, config);
         let velocity_factor_controller = config.velocity_factor.then(|| {
@@ -102,8 +112,13 @@ impl Pan2021 {
                 Lstm::new(init, "lstm2", last_input, code),
             ),
         };
+        // A residual network begins as the estimate that it adds to.
+        let last = match config.output {
+            Output::Absolute => LastLayer::Linear,
+            Output::Residual => LastLayer::Zero,
+        };
         let decoder = |init: &mut Initialiser<'_, T, R>, name: &str, outputs: usize| {
-            Mlp::new(init, name, &[code, wide, code, outputs], false)
+            Mlp::new(init, name, &[code, wide, code, outputs], last)
         };
         let (state_decoder, root_decoder) = match config.decoders {
             1 => (decoder(init, "state_decoder", FRAME), None),
