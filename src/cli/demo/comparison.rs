@@ -1,30 +1,35 @@
-//! Whether the model is ahead of interpolation.
+//! Whether the model is ahead of what needs no training.
 
 use std::fmt;
 
 use crate::evaluation::Evaluation;
 
-/// Lengths of transition (frames) at which a model must be ahead: where slerp knows nothing of the dance any more.
+/// Lengths of transition (frames) at which a model must be ahead: where the keyframes say little of the dance between them.
 const LONG: [usize; 2] = [100, 150];
 
-/// The scores of a model and of interpolation on the same windows; its `Display` sets their LRP side by side.
+/// The scores of a model, of interpolation and of the model before its training on the same windows; its `Display` sets their LRP
+/// side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     pub interpolation: Evaluation,
+    /// The best linear estimate from the keyframes, which a residual network begins with.
+    pub untrained: Evaluation,
     pub model: Evaluation,
 }
 
 impl Comparison {
-    /// Whether the model's LRP is the lower one at every long transition.
+    /// Whether the model's LRP is the lowest at every long transition.
     pub fn is_ahead(&self) -> bool {
-        self.long().all(|(_, model, other)| model < other)
+        self.long()
+            .all(|(_, [model, untrained, other])| model < untrained && model < other)
     }
 
-    /// Length, LRP of the model and of interpolation, cm.
-    fn long(&self) -> impl Iterator<Item = (usize, f64, f64)> {
+    /// Length, LRP (cm) of the model, of the model untrained and of interpolation.
+    fn long(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         LONG.into_iter().map(|length| {
             let lrp = |evaluation: &Evaluation| evaluation.lrp.at(length).unwrap_or(f64::NAN);
-            (length, lrp(&self.model), lrp(&self.interpolation))
+            let scores = [&self.model, &self.untrained, &self.interpolation].map(lrp);
+            (length, scores)
         })
     }
 }
@@ -32,11 +37,11 @@ impl Comparison {
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "LRP at long transitions:")?;
-        for (index, (length, model, other)) in self.long().enumerate() {
-            let comma = if index > 0 { "," } else { "" };
+        for (index, (length, [model, untrained, other])) in self.long().enumerate() {
+            let end = if index > 0 { ";" } else { "" };
             write!(
                 f,
-                "{comma} N = {length}: model {model:.2} cm, interpolation {other:.2} cm"
+                "{end} N = {length}: model {model:.2} cm, untrained {untrained:.2} cm, interpolation {other:.2} cm"
             )?;
         }
         Ok(())
@@ -64,12 +69,13 @@ mod tests {
         let ahead = |model: [f64; 2]| {
             Comparison {
                 interpolation: evaluation([70.0, 80.0]),
+                untrained: evaluation([75.0, 78.0]),
                 model: evaluation(model),
             }
             .is_ahead()
         };
-        assert!(ahead([69.9, 79.9]));
-        assert!(!ahead([69.9, 80.0]));
+        assert!(ahead([69.9, 77.9]));
+        assert!(!ahead([69.9, 78.0]));
         assert!(!ahead([70.1, 10.0]));
         assert!(!ahead([f64::NAN, 10.0]));
     }

@@ -6,8 +6,16 @@ use std::ops::ControlFlow;
 use crate::cli::progress::Progress;
 use crate::cli::tables::thousands;
 use crate::data::Dataset;
+use crate::models::TrainedModel;
 use crate::report::{FigureError, LossSeries, loss_curve};
 use crate::training::{ExperimentConfig, RunFolder, StepReport, Trainer};
+
+/// What a training was and what it began with.
+pub struct Trained {
+    pub losses: Losses,
+    /// The model with its initial weights.
+    pub untrained: TrainedModel,
+}
 
 /// Losses over a training: the total, then its terms.
 pub struct Losses {
@@ -21,7 +29,7 @@ pub fn train(
     dataset: &Dataset,
     threads: usize,
     run: &RunFolder,
-) -> anyhow::Result<Losses> {
+) -> anyhow::Result<Trained> {
     let mut trainer = Trainer::new(config.clone(), dataset, threads)?;
     writeln!(
         std::io::stdout(),
@@ -30,6 +38,7 @@ pub fn train(
         trainer.schedule().steps(),
         thousands(trainer.schedule().frame_steps())
     )?;
+    let untrained = trainer.model();
     let mut progress = Progress::new(trainer.schedule(), 0);
     let mut losses = Losses {
         series: Vec::new(),
@@ -42,7 +51,7 @@ pub fn train(
     });
     progress.end();
     outcome?;
-    Ok(losses)
+    Ok(Trained { losses, untrained })
 }
 
 impl Losses {
