@@ -70,6 +70,13 @@ fn residual() -> Pan2021Config {
     }
 }
 
+fn with_control_path() -> Pan2021Config {
+    Pan2021Config {
+        control_path: true,
+        ..residual()
+    }
+}
+
 /// A network with its weights.
 struct Built<T> {
     network: Pan2021,
@@ -418,10 +425,20 @@ fn the_gradient_of_residual_outputs_is_that_of_central_differences() {
     gradients_are_right(&residual());
 }
 
+#[test]
+fn the_gradient_with_a_control_path_is_that_of_central_differences() {
+    gradients_are_right(&with_control_path());
+}
+
 /// The ablations and options that change the network.
-fn networks() -> [Pan2021Config; 6] {
+fn networks() -> [Pan2021Config; 8] {
     [
         residual(),
+        with_control_path(),
+        Pan2021Config {
+            velocity_factor: false,
+            ..with_control_path()
+        },
         whole_model(),
         one_lstm(),
         condition_fc(),
@@ -817,7 +834,7 @@ fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction
         let standardisation = root_frame.standardisation(views, length);
         let config = Pan2021Config {
             root_frame,
-            ..residual().small()
+            ..with_control_path().small()
         };
         let built: Built<f32> = build(&config, &standardisation).disturbed();
         let model = TrainedModel::new(

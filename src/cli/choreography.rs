@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
-use crate::data::choreography::{ChoreographyConfig, generate};
+use crate::data::choreography::{ChoreographyConfig, clips};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub fn run(args: ChoreographyArgs) -> anyhow::Result<()> {
         frames_per_clip: args.frames,
         seed: args.seed,
     };
-    let clips = generate(&config)?;
+    let clips = clips(&config)?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{} cannot be created", args.out.display()))?;
     let mut out = std::io::stdout();

@@ -90,6 +90,16 @@ pub struct GeneratedClip {
 /// # Errors
 /// [`ChoreographyError`] where no clip or more than 1000 are asked for, or clips shorter or longer than what can be made.
 pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, ChoreographyError> {
+    Ok(clips(config)?.collect())
+}
+
+/// The clips of a configuration one after the other, for more of them than memory holds.
+///
+/// # Errors
+/// As [`generate`].
+pub fn clips(
+    config: &ChoreographyConfig,
+) -> Result<impl Iterator<Item = GeneratedClip> + use<>, ChoreographyError> {
     if config.clips == 0 {
         return Err(ChoreographyError::NoClips);
     }
@@ -103,9 +113,8 @@ pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, Chore
             frames: config.frames_per_clip,
         });
     }
-    Ok((0..config.clips)
-        .map(|number| dance(number, config.frames_per_clip, config.seed))
-        .collect())
+    let (frames, seed) = (config.frames_per_clip, config.seed);
+    Ok((0..config.clips).map(move |number| dance(number, frames, seed)))
 }
 
 /// One clip, on a random stream of its own.

@@ -70,6 +70,8 @@ pub struct Pan2021Config {
     pub root_frame: RootFrame,
     /// What the decoders give; the paper's give the frame itself.
     pub output: Output,
+    /// A feed-forward path from the controls around each frame to what is added to its estimate; not in the paper.
+    pub control_path: bool,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,
     /// Codes, LSTM states, Transformer tokens, second hidden layer of the decoders.
@@ -94,6 +96,7 @@ impl Default for Pan2021Config {
             velocity_factor: true,
             root_frame: RootFrame::World,
             output: Output::Absolute,
+            control_path: false,
             hidden: 512,
             code: 256,
             window: 7,
@@ -162,6 +165,12 @@ impl Pan2021Config {
                 "model.code = {}: expected a multiple of model.heads = {}",
                 self.code, self.heads
             ));
+        }
+        if self.control_path && self.output == Output::Absolute {
+            return complain(
+                "model.control_path = true corrects an estimate: expected model.output = \"residual\""
+                    .into(),
+            );
         }
         if self.window.is_multiple_of(2) || self.window > 1001 {
             return complain(format!(

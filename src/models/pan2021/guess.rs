@@ -62,6 +62,11 @@ impl Estimator {
         self.left(2.0 * (1.0 - likeness(1)), step)
     }
 
+    /// Correlation of p^b in frame k1 + `t` with that of k1 and with that of k2.
+    pub fn likenesses(&self, t: usize) -> [f64; 2] {
+        [likeness(t), likeness(self.transition - t)]
+    }
+
     /// Covariances of what is given with p^b of frame k1 + `t`.
     fn covariances(&self, t: usize) -> DVec3 {
         DVec3::new(likeness(t), step(t), likeness(self.transition - t))

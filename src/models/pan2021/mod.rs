@@ -2,6 +2,7 @@
 //!
 //! - `config`: sizes and ablations;
 //! - `controller`: root trajectory and velocity factor controllers (figure 3);
+//! - `control_path`: a feed-forward path from the controls, an option;
 //! - `network`: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
 //! - `guess`: what a residual network's numbers are added to;
 //! - `losses`: eq. 3 to 11;
@@ -10,6 +11,7 @@
 //! `docs/model.md` fixes shapes, names and units.
 
 mod config;
+mod control_path;
 mod controller;
 mod guess;
 mod losses;

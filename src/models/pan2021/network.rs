@@ -4,6 +4,7 @@ use ndarray::Array3;
 use rand::Rng;
 
 use super::config::{Output, Pan2021Config};
+use super::control_path::{ControlPath, Given};
 use super::controller::{Controller, Session, Trajectory};
 use super::guess::Estimator;
 use super::losses;
@@ -12,7 +13,8 @@ use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::data::Standardisation;
 use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
 use crate::motion::features::{
-    BODY_POSITIONS, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION,
+    VELOCITY_FACTORS,
 };
 use crate::nn::{Initialiser, LastLayer, Lstm, Mlp};
 
@@ -36,6 +38,7 @@ pub struct Pan2021 {
     position_encoder: Mlp,
     root_trajectory_controller: Controller,
     velocity_factor_controller: Option<Controller>,
+    control_path: Option<ControlPath>,
     lstm: Backbone,
     state_decoder: Mlp,
     root_decoder: Option<Mlp>,
@@ -105,6 +108,7 @@ impl Pan2021 {
             let channels = VELOCITY_FACTORS.len();
             Controller::new(init, "velocity_factor_controller", channels, config)
         });
+        let control_path = config.control_path.then(|| ControlPath::new(init, config));
         let lstm = match config.lstms {
             1 => Backbone::One(Lstm::new(init, "lstm", last_input, code)),
             _ => Backbone::Two(
@@ -136,6 +140,7 @@ impl Pan2021 {
             position_encoder,
             root_trajectory_controller,
             velocity_factor_controller,
+            control_path,
             lstm,
             state_decoder,
             root_decoder,
@@ -182,12 +187,22 @@ impl Pan2021 {
                 vec![first.start(tape, windows), second.start(tape, windows)]
             }
         };
+        let transition = frames - 1;
+        let estimator = Estimator::new(transition);
+        let given = Given { values, windows };
+        let corrections = match &self.control_path {
+            Some(path) => {
+                Some(path.corrections(tape, &self.units, &estimator, given, transition)?)
+            }
+            None => None,
+        };
         Ok(Rollout {
             network: self,
             values,
             windows,
-            transition: frames - 1,
-            estimator: Estimator::new(frames - 1),
+            transition,
+            estimator,
+            corrections,
             target_code,
             states,
             root,
@@ -225,6 +240,8 @@ struct Rollout<'n, 'f, T> {
     /// N
     transition: usize,
     estimator: Estimator,
+    /// Of p^b, `[N * windows, 69]`, where the network has a control path.
+    corrections: Option<Var>,
     target_code: Var,
     states: Vec<Var>,
     root: Session<'n, T>,
@@ -332,9 +349,40 @@ impl<T: Real> Rollout<'_, '_, T> {
                 let open = self.open(tape, t);
                 let scaled = tape.mul(decoded, open)?;
                 let guess = self.guess(tape, t);
-                tape.add(scaled, guess)
+                let frame = tape.add(scaled, guess)?;
+                match self.corrections {
+                    Some(corrections) => self.corrected(tape, t, frame, corrections),
+                    None => Ok(frame),
+                }
             }
         }
+    }
+
+    /// Frame t + 1 with the control path's corrections of p^b, and their change since frame t in v^b.
+    fn corrected(
+        &self,
+        tape: &mut Tape<'_, T>,
+        t: usize,
+        frame: Var,
+        corrections: Var,
+    ) -> Result<Var, AutogradError> {
+        let windows = self.windows;
+        let places = tape.rows(corrections, t * windows..(t + 1) * windows)?;
+        // In k1 there is nothing to correct.
+        let changes = match t {
+            0 => places,
+            _ => {
+                let before = tape.rows(corrections, (t - 1) * windows..t * windows)?;
+                tape.sub(places, before)?
+            }
+        };
+        let speeds = self.network.units.speed_changes(tape, changes)?;
+        let mut nothing =
+            |columns: usize| tape.constant_with(&[windows, columns], |out| out.fill(T::zero()));
+        let between = nothing(VELOCITIES.start - BODY_POSITIONS.end);
+        let rest = nothing(FRAME - BODY_VELOCITIES.end);
+        let correction = tape.concat(&[places, between, speeds, rest])?;
+        tape.add(frame, correction)
     }
 
     /// The decoders' numbers, `[windows, 149]`.

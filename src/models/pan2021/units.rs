@@ -6,7 +6,7 @@ use ndarray::Array2;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::data::Standardisation;
 use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, ROOT_VELOCITY, VELOCITY_FACTORS,
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, ROOT_VELOCITY, VELOCITY_FACTORS,
 };
 use crate::motion::velocity_factor::{PART_WEIGHTS, PARTS};
 use crate::motion::{DANCE_PARENTS, JOINTS};
@@ -55,6 +55,11 @@ pub(super) struct Units {
     velocity_mean: Vec<f64>,
     /// Standard deviation of p^b, p^r (72).
     pub(super) position_std: Vec<f64>,
+    /// Mean and standard deviation of o^r, rad.
+    facing_mean: f64,
+    pub(super) facing_std: f64,
+    /// Standard deviation of v^r on the floor, cm/frame, the same in every direction.
+    pub(super) floor_speed: f64,
     /// Mean of p^b (69).
     body_mean: Vec<f64>,
     pub(super) contact_std: Vec<f64>,
@@ -78,6 +83,10 @@ impl Units {
             velocity_std: std[VELOCITIES].to_vec(),
             velocity_mean: mean[VELOCITIES].to_vec(),
             position_std: std[..VELOCITIES.len()].to_vec(),
+            facing_mean: mean[FACING.start],
+            facing_std: std[FACING.start],
+            floor_speed: std[ROOT_VELOCITY.start].hypot(std[ROOT_VELOCITY.start + 2])
+                / std::f64::consts::SQRT_2,
             body_mean: mean[BODY_POSITIONS].to_vec(),
             contact_std: std[CONTACTS].to_vec(),
             contact_mean: mean[CONTACTS].to_vec(),
@@ -87,6 +96,11 @@ impl Units {
             position_scale: standardisation.position_scale,
             velocity_scale: standardisation.velocity_scale,
         }
+    }
+
+    /// o^r from its standardised number, rad.
+    pub(super) fn facing<T: Real>(&self, standardised: T) -> T {
+        standardised * T::from_f64(self.facing_std) + T::from_f64(self.facing_mean)
     }
 
     /// p^b in cm of one standardised frame.
@@ -106,6 +120,17 @@ impl Units {
     pub(super) fn standardised_speed<T: Real>(&self, number: usize, speed: T) -> T {
         let [scale, offset] = self.speed_map(number);
         speed * T::from_f64(scale) + T::from_f64(offset)
+    }
+
+    /// v^b for changes of p^b a frame, `[rows, 69]`, both standardised: a difference of velocities, so means do not count.
+    pub(super) fn speed_changes<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        changes: Var,
+    ) -> Result<Var, AutogradError> {
+        let scales: Vec<f64> = BODY_POSITIONS.map(|i| self.speed_map(i)[0]).collect();
+        let scales = constant(tape, &[scales.len()], &scales);
+        tape.mul(changes, scales)
     }
 
     /// Scale and offset from position deviations a frame to a standardised velocity.
