@@ -1,22 +1,22 @@
 //! The network of Pan et al. 2021 and its ablations: what is built, what flows where, and that gradients are right.
 
+#[path = "common/network.rs"]
+mod network;
+
 use std::collections::BTreeMap;
 
-use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
-use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, RootFrame, Standardisation, window_features};
-use keydance::evaluation::window_request;
+use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
+use keydance::data::Standardisation;
 use keydance::models::gradient_check::{
     GradientCase, GradientCheckConfig, check_model, generated_windows,
 };
-use keydance::models::pan2021::{Controllers, LossWeights, Output, Pan2021, Pan2021Config};
-use keydance::models::{
-    Batch, Feed, ModelConfig, Network, TrainedModel, Transition, TransitionModel, TransitionRequest,
-};
-use keydance::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
+use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
+use keydance::models::{Batch, Feed, ModelConfig, Network};
+use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
-use ndarray::{Array2, Array3, ArrayView1, Axis, s};
-use rand::{RngExt, SeedableRng};
+use ndarray::{Array3, Axis, s};
+use network::{Built, build, predict, residual, with_control_path};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 type Shapes = BTreeMap<String, Vec<usize>>;
@@ -60,47 +60,6 @@ fn without_key_loss() -> Pan2021Config {
             ..LossWeights::default()
         },
         ..whole_model()
-    }
-}
-
-fn residual() -> Pan2021Config {
-    Pan2021Config {
-        output: Output::Residual,
-        ..whole_model()
-    }
-}
-
-fn with_control_path() -> Pan2021Config {
-    Pan2021Config {
-        control_path: true,
-        ..residual()
-    }
-}
-
-/// A network with its weights.
-struct Built<T> {
-    network: Pan2021,
-    parameters: Parameters<T>,
-}
-
-fn build<T: Real>(config: &Pan2021Config, standardisation: &Standardisation) -> Built<T> {
-    let mut parameters = Parameters::new();
-    let mut init = Initialiser::new(&mut parameters, ChaCha8Rng::seed_from_u64(3));
-    let network = Pan2021::new(&mut init, config, standardisation).unwrap();
-    Built {
-        network,
-        parameters,
-    }
-}
-
-impl<T: Real> Built<T> {
-    /// As after some training: no weight stands at a special value, such as the zeros that a residual network begins with.
-    fn disturbed(mut self) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        for (_, value) in self.parameters.values_mut() {
-            value.mapv_inplace(|x| x + T::from_f64(rng.random_range(-0.1..0.1)));
-        }
-        self
     }
 }
 
@@ -448,13 +407,6 @@ fn networks() -> [Pan2021Config; 8] {
     .map(|config| config.small())
 }
 
-fn predict<T: Real>(built: &Built<T>, features: &Array3<T>) -> Array3<T> {
-    let mut workspace = Workspace::new();
-    let mut tape = Tape::inference(&built.parameters, &mut workspace);
-    let batch = Batch::of(features.clone());
-    built.network.predict(&mut tape, &batch).unwrap()
-}
-
 fn largest_difference(a: &Array3<f64>, b: &Array3<f64>) -> f64 {
     assert_eq!(a.dim(), b.dim());
     a.iter()
@@ -702,192 +654,6 @@ fn each_output_of_the_decoders_is_its_number_of_the_frame() {
     }
 }
 
-/// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least expected square error, where numbers d
-/// frames apart correlate by r(d) of `docs/model.md`.
-fn estimate(t: usize, n: usize) -> [f64; 3] {
-    let r = |d: usize| 0.2 + 0.8 * (1.0 + d as f64 / 8.0) * (-(d as f64) / 8.0).exp();
-    let step = |d: usize| r(d) - r(d + 1);
-    let given = [
-        [1.0 + 1e-6, step(0), r(n)],
-        [step(0), (2.0 + 1e-6) * step(0), step(n)],
-        [r(n), step(n), 1.0 + 1e-6],
-    ];
-    let likely = glam::DVec3::new(r(t), step(t), r(n - t));
-    (glam::DMat3::from_cols_array_2d(&given).inverse() * likely).to_array()
-}
-
-#[test]
-fn an_untrained_residual_network_is_the_best_linear_estimate_on_the_given_trajectory() {
-    let (features, statistics) = generated_windows(8, 2, 13).unwrap();
-    let std = &statistics.std;
-    // From a velocity of p^b or p^r, standardised, to deviations of the position a frame, and back.
-    let speed =
-        |column: usize, v: f64| (v * std[77 + column] + statistics.mean[77 + column]) / std[column];
-    let velocity =
-        |column: usize, s: f64| (s * std[column] - statistics.mean[77 + column]) / std[77 + column];
-    for decoders in [1, 2] {
-        let config = Pan2021Config {
-            decoders,
-            ..residual().small()
-        };
-        let predicted = predict(&build(&config, &statistics), &features);
-        for ((t, window, column), found) in predicted.indexed_iter() {
-            let given = |row: usize, column: usize| features[[row, window, column]];
-            let place = |t: usize, column: usize| match column {
-                0..69 => {
-                    let [first, moving, last] = estimate(t, 8);
-                    let speed = speed(column, given(0, 77 + column));
-                    first * given(0, column) + moving * speed + last * given(8, column)
-                }
-                _ => given(t, column),
-            };
-            let expected = match column {
-                0..72 => place(t + 1, column),
-                72 => given(0, 72) + (t + 1) as f64 / 8.0 * (given(8, 72) - given(0, 72)),
-                73..77 => 0.0,
-                _ => {
-                    let column = column - 77;
-                    velocity(column, place(t + 1, column) - place(t, column))
-                }
-            };
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{t} {column}: {found}, {expected}"
-            );
-        }
-        // At k2 nothing is open: whatever the weights, p^b is the keyframe's and p^r the trajectory's.
-        let built: Built<f64> = build(&config, &statistics).disturbed();
-        let predicted = predict(&built, &features);
-        for window in 0..2 {
-            for column in 0..72 {
-                let missed = predicted[[7, window, column]] - features[[8, window, column]];
-                assert!(missed.abs() < 1e-2, "{column}: {missed}");
-            }
-        }
-    }
-}
-
-/// The same request `shift` further on, cm.
-fn moved(request: &TransitionRequest, shift: [f64; 3]) -> TransitionRequest {
-    let mut moved = request.clone();
-    for keyframe in [&mut moved.start, &mut moved.target] {
-        keyframe.pose.translations[0] += glam::DVec3::from_array(shift);
-        for (column, shift) in ROOT_POSITION.zip(shift) {
-            keyframe.features[column] += shift;
-        }
-    }
-    for (mut column, shift) in moved.root_trajectory.columns_mut().into_iter().zip(shift) {
-        column += shift;
-    }
-    moved
-}
-
-/// The same request on a floor turned by `angle` about Y, rad.
-fn turned(request: &TransitionRequest, angle: f64) -> TransitionRequest {
-    let turn = glam::DQuat::from_rotation_y(angle);
-    let around = |x: f64, y: f64, z: f64| (turn * glam::DVec3::new(x, y, z)).to_array();
-    let mut turned = request.clone();
-    for keyframe in [&mut turned.start, &mut turned.target] {
-        keyframe.pose.translations[0] = turn * keyframe.pose.translations[0];
-        let features = &mut keyframe.features;
-        for columns in [ROOT_POSITION, ROOT_VELOCITY] {
-            let at = columns.start;
-            let vector = around(features[at], features[at + 1], features[at + 2]);
-            features
-                .slice_mut(s![columns])
-                .assign(&ArrayView1::from(&vector));
-        }
-        features[FACING.start] += angle;
-    }
-    for mut place in turned.root_trajectory.rows_mut() {
-        let vector = around(place[0], place[1], place[2]);
-        place.assign(&ArrayView1::from(&vector));
-    }
-    turned
-}
-
-#[test]
-fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction_is_the_same_dance()
-{
-    let generated = generate(&ChoreographyConfig {
-        clips: 2,
-        frames_per_clip: 120,
-        seed: 4,
-    });
-    let clips: Vec<DanceClip> = generated
-        .unwrap()
-        .into_iter()
-        .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()).unwrap())
-        .collect();
-    let (clip, start, length) = (&clips[0], 30, 20);
-    let window = window_features(&clip.features, start, length);
-    let request = window_request(&clip.clip, start, window.view()).unwrap();
-    let shift = [250.0, 0.0, -130.0];
-    let raised = [0.0, 40.0, 0.0];
-    let angle = 2.0;
-    for (root_frame, same_elsewhere, same_turned) in [
-        (RootFrame::World, false, false),
-        (RootFrame::Keyframe, true, false),
-        (RootFrame::KeyframeFacing, true, true),
-    ] {
-        let views: Vec<_> = clips.iter().map(|clip| clip.features.view()).collect();
-        let standardisation = root_frame.standardisation(views, length);
-        let config = Pan2021Config {
-            root_frame,
-            ..with_control_path().small()
-        };
-        let built: Built<f32> = build(&config, &standardisation).disturbed();
-        let model = TrainedModel::new(
-            "small".into(),
-            Box::new(built.network) as Box<dyn Network<f32>>,
-            built.parameters,
-            standardisation,
-            ModelConfig::Pan2021(config).root_frame(),
-        );
-        let requests = [
-            request.clone(),
-            moved(&request, shift),
-            moved(&request, raised),
-            turned(&request, angle),
-        ];
-        let [here, there, above, around] =
-            model.transitions(&requests).unwrap().try_into().unwrap();
-        // Near the trajectory that was asked for, in the world.
-        let near = |transition: &Transition, request: &TransitionRequest| {
-            let missed = &transition.frames.slice(s![.., ROOT_POSITION])
-                - &request.root_trajectory.slice(s![1.., ..]);
-            missed.iter().all(|x| x.abs() < 150.0)
-        };
-        assert!(near(&here, &request), "{root_frame:?}");
-        assert!(near(&around, &requests[3]), "{root_frame:?}");
-        let difference = |other: &Array2<f64>, shift: [f64; 3]| {
-            let mut difference = other - &here.frames;
-            for (column, shift) in ROOT_POSITION.zip(shift) {
-                difference.column_mut(column).mapv_inplace(|x| x - shift);
-            }
-            difference.iter().fold(0f64, |most, x| most.max(x.abs()))
-        };
-        let same = difference(&there.frames, shift) < 1e-2;
-        assert_eq!(same, same_elsewhere, "{root_frame:?}");
-        // Heights are above the floor in each.
-        assert!(difference(&above.frames, raised) > 0.1);
-        let mut back = around.frames;
-        let turn = glam::DQuat::from_rotation_y(-angle);
-        for mut frame in back.rows_mut() {
-            for at in [ROOT_POSITION.start, ROOT_VELOCITY.start] {
-                let vector = glam::DVec3::new(frame[at], frame[at + 1], frame[at + 2]);
-                let vector = (turn * vector).to_array();
-                frame
-                    .slice_mut(s![at..at + 3])
-                    .assign(&ArrayView1::from(&vector));
-            }
-            frame[FACING.start] -= angle;
-        }
-        let same = difference(&back, [0.0; 3]) < 1e-2;
-        assert_eq!(same, same_turned, "{root_frame:?}");
-    }
-}
-
 #[test]
 fn sizes_that_no_model_has_are_refused_by_their_key() {
     type Change = fn(&mut Pan2021Config);
@@ -900,7 +666,7 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         let built = model.build(&mut init, &Standardisation::fit([]));
         built.err().unwrap().to_string()
     };
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 10] = [
         (
             |config| config.lstms = 3,
             "model.lstms = 3: expected 1 or 2",
@@ -924,6 +690,10 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         (
             |config| config.window = 6,
             "model.window = 6: expected an odd number",
+        ),
+        (
+            |config| config.control_path = true,
+            "expected model.output = \"residual\"",
         ),
         (
             |config| config.dropout = 1.0,
