@@ -3,12 +3,11 @@
 use rand::Rng;
 
 use super::config::Pan2021Config;
-use super::guess::Estimator;
+use super::given::Given;
+use super::guess::{Estimator, estimate};
 use super::units::Units;
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, FACING, FEATURES, ROOT_POSITION, VELOCITY_FACTORS,
-};
+use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::nn::{Initialiser, LastLayer, Mlp};
 
 /// Frames, from the one that is predicted, whose controls are seen; those before k1 and after k2 are the keyframes'.
@@ -18,27 +17,14 @@ const TURN_SCALE: f64 = 30.0;
 
 /// Corrections of the estimate of p^b from the given trajectory, the velocity factors and the keyframes, without memory: an [`Mlp`].
 ///
-/// What it sees of frame t: the mean velocity of p^r from it to each of the [`OFFSETS`] but 0, seen in the direction between the keyframes' o^r,
-/// x and z, in deviations of v^r; the height of the root and, where the network has them, the five velocity factors at each,
+/// What it sees of frame t: the mean velocity of p^r from it to each of the [`OFFSETS`] but 0, turned to the direction that is between the
+/// keyframes' o^r there, x and z, in deviations of v^r; the height of the root and, where the network has them, the five velocity factors at each,
 /// standardised; the turn from k1 to k2, rad a frame times 30; the estimate, p^b of k1 and of k2, these two times their likeness to
 /// frame t. All that twice, the second time multiplied with what the estimate leaves open in frame t, as the correction is itself.
 #[derive(Debug, Clone)]
 pub(super) struct ControlPath {
     layers: Mlp,
     velocity_factor: bool,
-}
-
-/// A batch as the network is given it: standardised `[frames, windows, 154]`.
-#[derive(Clone, Copy)]
-pub(super) struct Given<'f, T> {
-    pub values: &'f [T],
-    pub windows: usize,
-}
-
-impl<'f, T> Given<'f, T> {
-    pub fn frame(&self, frame: usize, window: usize) -> &'f [T] {
-        &self.values[(frame * self.windows + window) * FEATURES..][..FEATURES]
-    }
 }
 
 impl ControlPath {
@@ -54,61 +40,59 @@ impl ControlPath {
         }
     }
 
-    /// Corrections of p^b in frames k1 + 1 .. k2, N = `transition`, in deviations of p^b: `[N * windows, 69]`, frame by frame.
+    /// Corrections of p^b in frames k1 + 1 .. k2, in deviations of p^b: `[N * windows, 69]`, frame by frame.
     ///
     /// # Errors
-    /// None on a batch of the right shape.
+    /// None with the weights that [`ControlPath::new`] added.
     pub fn corrections<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         units: &Units,
         estimator: &Estimator,
         given: Given<'_, T>,
-        transition: usize,
     ) -> Result<Var, AutogradError> {
-        let width = 2 * seen(self.velocity_factor);
-        let rows = transition * given.windows;
-        let input = tape.constant_with(&[rows, width], |out| {
-            for (row, out) in out.chunks_exact_mut(width).enumerate() {
-                let (t, window) = (1 + row / given.windows, row % given.windows);
-                let (plain, opened) = out.split_at_mut(width / 2);
-                self.see(units, estimator, given, (transition, t, window), plain);
-                let open = T::from_f64(estimator.deviation(t));
-                for (opened, &plain) in opened.iter_mut().zip(&*plain) {
-                    *opened = open * plain;
+        let half = seen(self.velocity_factor);
+        let rows = given.transition * given.windows;
+        let open: Vec<T> = (1..=given.transition)
+            .map(|t| T::from_f64(estimator.deviation(t)))
+            .collect();
+        let input = tape.constant_with(&[rows, 2 * half], |out| {
+            let mut seen = Vec::with_capacity(half);
+            for (row, out) in out.chunks_exact_mut(2 * half).enumerate() {
+                let (before, window) = (row / given.windows, row % given.windows);
+                seen.clear();
+                self.see(units, estimator, given, (before + 1, window), &mut seen);
+                let (plain, opened) = out.split_at_mut(half);
+                plain.copy_from_slice(&seen);
+                for (opened, &plain) in opened.iter_mut().zip(&seen) {
+                    *opened = open[before] * plain;
                 }
             }
         });
         let corrections = self.layers.forward(tape, input)?;
         let open = tape.constant_with(&[rows, 1], |out| {
-            for (t, out) in (1..).zip(out.chunks_exact_mut(given.windows.max(1))) {
-                out.fill(T::from_f64(estimator.deviation(t)));
+            for (out, &open) in out.chunks_exact_mut(given.windows.max(1)).zip(&open) {
+                out.fill(open);
             }
         });
         tape.mul(corrections, open)
     }
 
-    /// What is seen of frame `t` of a window.
+    /// Appends what is seen of frame k1 + `t` of a window.
     fn see<T: Real>(
         &self,
         units: &Units,
         estimator: &Estimator,
         given: Given<'_, T>,
-        (transition, t, window): (usize, usize, usize),
-        out: &mut [T],
+        (t, window): (usize, usize),
+        seen: &mut Vec<T>,
     ) {
-        let frame = |index: usize| given.frame(index, window);
-        let (first, last, now) = (frame(0), frame(transition), frame(t));
-        let near = |offset: isize| frame(t.saturating_add_signed(offset).min(transition));
-        let turn = (last[FACING.start] - first[FACING.start]) / T::from_f64(transition as f64);
+        let n = given.transition;
+        let [first, last, now] = [0, n, t].map(|t| given.row(t, window));
+        let near = |offset: isize| given.row(t.saturating_add_signed(offset).min(n), window);
+        let turn = (last[FACING.start] - first[FACING.start]) / T::from_f64(n as f64);
         let facing = units.facing(first[FACING.start] + turn * T::from_f64(t as f64));
         let (sin, cos) = facing.sin_cos();
-        let mut out = out.iter_mut();
-        let mut put = |number: T| {
-            if let Some(out) = out.next() {
-                *out = number;
-            }
-        };
         for offset in OFFSETS.into_iter().filter(|&offset| offset != 0) {
             let scale = 1.0 / (offset.unsigned_abs() as f64 * units.floor_speed);
             let [x, z] = [0, 2].map(|axis| {
@@ -116,38 +100,30 @@ impl ControlPath {
                 (near(offset)[column] - now[column])
                     * T::from_f64(scale * units.position_std[column])
             });
-            put(cos * x - sin * z);
-            put(cos * z + sin * x);
+            seen.extend([cos * x - sin * z, cos * z + sin * x]);
         }
         for offset in OFFSETS {
-            put(near(offset)[ROOT_POSITION.start + 1]);
+            seen.push(near(offset)[ROOT_POSITION.start + 1]);
             if self.velocity_factor {
-                near(offset)[VELOCITY_FACTORS]
-                    .iter()
-                    .copied()
-                    .for_each(&mut put);
+                seen.extend(&near(offset)[VELOCITY_FACTORS]);
             }
         }
-        put(turn * T::from_f64(units.facing_std * TURN_SCALE));
+        seen.push(turn * T::from_f64(units.facing_std * TURN_SCALE));
         let weights = estimator.weights(t).map(T::from_f64);
-        for column in BODY_POSITIONS {
-            let speed = units.speed(column, first[BODY_VELOCITIES.start + column]);
-            put(weights[0] * first[column] + weights[1] * speed + weights[2] * last[column]);
-        }
+        seen.extend(
+            BODY_POSITIONS.map(|number| estimate(weights, units.ends(number, first, last))),
+        );
         let [to_first, to_last] = estimator.likenesses(t).map(T::from_f64);
-        first[BODY_POSITIONS]
-            .iter()
-            .for_each(|&x| put(to_first * x));
-        last[BODY_POSITIONS].iter().for_each(|&x| put(to_last * x));
+        seen.extend(first[BODY_POSITIONS].iter().map(|&x| to_first * x));
+        seen.extend(last[BODY_POSITIONS].iter().map(|&x| to_last * x));
     }
 }
 
 /// Numbers that are seen of one frame.
 fn seen(velocity_factor: bool) -> usize {
-    let factors = if velocity_factor {
-        VELOCITY_FACTORS.len()
-    } else {
-        0
+    let factors = match velocity_factor {
+        true => VELOCITY_FACTORS.len(),
+        false => 0,
     };
     2 * (OFFSETS.len() - 1) + OFFSETS.len() * (1 + factors) + 1 + 3 * BODY_POSITIONS.len()
 }

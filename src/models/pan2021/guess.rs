@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::autograd::Real;
+
 /// Frames over which a number of a pose loses its likeness to itself, see [`likeness`].
 const TIME: f64 = 8.0;
 /// What of the likeness stays at any distance: a dancer's own mean is not that of all.
@@ -77,6 +79,11 @@ impl Estimator {
         let known = covariances.dot(self.inverse * covariances);
         (1.0 - known / variance).max(0.0).sqrt()
     }
+}
+
+/// The estimate of a number of p^b, from [`Estimator::weights`] and p^b and v^b of k1 and p^b of k2, in deviations of p^b.
+pub(super) fn estimate<T: Real>(weights: [T; 3], ends: [T; 3]) -> T {
+    weights[0] * ends[0] + weights[1] * ends[1] + weights[2] * ends[2]
 }
 
 /// Covariance of p^b with v^b `frames` earlier.

@@ -4,6 +4,7 @@
 //! - `controller`: root trajectory and velocity factor controllers (figure 3);
 //! - `control_path`: a feed-forward path from the controls, an option;
 //! - `network`: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
+//! - `given`: a batch as the network is given it;
 //! - `guess`: what a residual network's numbers are added to;
 //! - `losses`: eq. 3 to 11;
 //! - `units`: from standardised numbers to centimetres on the tape.
@@ -13,6 +14,7 @@
 mod config;
 mod control_path;
 mod controller;
+mod given;
 mod guess;
 mod losses;
 mod network;

@@ -4,17 +4,17 @@ use ndarray::Array3;
 use rand::Rng;
 
 use super::config::{Output, Pan2021Config};
-use super::control_path::{ControlPath, Given};
+use super::control_path::ControlPath;
 use super::controller::{Controller, Session, Trajectory};
-use super::guess::Estimator;
+use super::given::Given;
+use super::guess::{self, Estimator};
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::data::Standardisation;
 use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
 use crate::motion::features::{
-    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION,
-    VELOCITY_FACTORS,
+    BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
 use crate::nn::{Initialiser, LastLayer, Lstm, Mlp};
 
@@ -152,27 +152,14 @@ impl Pan2021 {
         tape: &mut Tape<'_, T>,
         features: &'f Array3<T>,
     ) -> Result<Rollout<'n, 'f, T>, AutogradError> {
-        let (frames, windows, numbers) = features.dim();
-        let values = match features.as_slice() {
-            Some(values) if frames >= 2 && numbers == FEATURES => values,
-            _ => {
-                return Err(AutogradError::Argument {
-                    operation: "pan2021",
-                    shape: features.shape().to_vec(),
-                    argument: "the features of a batch".into(),
-                    expected: "[N + 1, windows, 154] in standard layout, N at least 1",
-                });
-            }
-        };
+        let given = Given::new(features)?;
+        let (transition, windows) = (given.transition, given.windows);
         let trajectory = |columns: std::ops::Range<usize>| Trajectory {
-            values: values
-                .chunks_exact(FEATURES)
-                .flat_map(|frame| frame[columns.clone()].iter().copied())
-                .collect(),
-            frames,
+            values: given.all(columns),
+            frames: transition + 1,
             windows,
         };
-        let keyframe = gather(tape, values, windows, frames - 1, KEYFRAME);
+        let keyframe = given.constant(tape, transition, KEYFRAME);
         let target_code = self.target_controller.forward(tape, keyframe)?;
         let root = self
             .root_trajectory_controller
@@ -187,20 +174,14 @@ impl Pan2021 {
                 vec![first.start(tape, windows), second.start(tape, windows)]
             }
         };
-        let transition = frames - 1;
         let estimator = Estimator::new(transition);
-        let given = Given { values, windows };
         let corrections = match &self.control_path {
-            Some(path) => {
-                Some(path.corrections(tape, &self.units, &estimator, given, transition)?)
-            }
+            Some(path) => Some(path.corrections(tape, &self.units, &estimator, given)?),
             None => None,
         };
         Ok(Rollout {
             network: self,
-            values,
-            windows,
-            transition,
+            given,
             estimator,
             corrections,
             target_code,
@@ -212,33 +193,10 @@ impl Pan2021 {
     }
 }
 
-/// Columns of frame `frame` of `[frames, windows, 154]`, as a constant `[windows, columns]`.
-fn gather<T: Real>(
-    tape: &mut Tape<'_, T>,
-    values: &[T],
-    windows: usize,
-    frame: usize,
-    columns: std::ops::Range<usize>,
-) -> Var {
-    let rows = &values[frame * windows * FEATURES..(frame + 1) * windows * FEATURES];
-    tape.constant_with(&[windows, columns.len()], |out| {
-        for (out, row) in out
-            .chunks_exact_mut(columns.len())
-            .zip(rows.chunks_exact(FEATURES))
-        {
-            out.copy_from_slice(&row[columns.clone()]);
-        }
-    })
-}
-
 /// The network at work on the windows of one batch.
 struct Rollout<'n, 'f, T> {
     network: &'n Pan2021,
-    /// `[N + 1, windows, 154]`
-    values: &'f [T],
-    windows: usize,
-    /// N
-    transition: usize,
+    given: Given<'f, T>,
     estimator: Estimator,
     /// Of p^b, `[N * windows, 69]`, where the network has a control path.
     corrections: Option<Var>,
@@ -254,12 +212,12 @@ impl<T: Real> Rollout<'_, '_, T> {
     /// Feeds the true frame `t`.
     fn feed_truth(&mut self, tape: &mut Tape<'_, T>, t: usize) {
         let fed = Fed {
-            frame: gather(tape, self.values, self.windows, t, 0..FRAME),
-            root: gather(tape, self.values, self.windows, t, ROOT_POSITION),
+            frame: self.given.constant(tape, t, 0..FRAME),
+            root: self.given.constant(tape, t, ROOT_POSITION),
             factors: self
                 .factors
                 .is_some()
-                .then(|| gather(tape, self.values, self.windows, t, VELOCITY_FACTORS)),
+                .then(|| self.given.constant(tape, t, VELOCITY_FACTORS)),
         };
         self.feed(t, fed);
     }
@@ -366,7 +324,7 @@ impl<T: Real> Rollout<'_, '_, T> {
         frame: Var,
         corrections: Var,
     ) -> Result<Var, AutogradError> {
-        let windows = self.windows;
+        let windows = self.given.windows;
         let places = tape.rows(corrections, t * windows..(t + 1) * windows)?;
         // In k1 there is nothing to correct.
         let changes = match t {
@@ -415,26 +373,22 @@ impl<T: Real> Rollout<'_, '_, T> {
     /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`Estimator`] has it, p^r of the given
     /// trajectory, o^r linearly between the keyframes; v^b and v^r the differences of these p^b and p^r; c 0, their means.
     fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
-        let (units, n) = (&self.network.units, self.transition);
+        let (units, n) = (&self.network.units, self.given.transition);
         let weights = [t, t + 1].map(|t| self.estimator.weights(t).map(T::from_f64));
         let share = T::from_f64((t + 1) as f64 / n as f64);
-        let frame = |index: usize| {
-            self.values[index * self.windows * FEATURES..(index + 1) * self.windows * FEATURES]
-                .chunks_exact(FEATURES)
-        };
-        let ends = frame(0).zip(frame(n));
-        let given = frame(t).zip(frame(t + 1));
-        tape.constant_with(&[self.windows, FRAME], |out| {
+        let ends = self.given.frame(0).zip(self.given.frame(n));
+        let given = self.given.frame(t).zip(self.given.frame(t + 1));
+        tape.constant_with(&[self.given.windows, FRAME], |out| {
             for (out, ((first, last), (before, now))) in
                 out.chunks_exact_mut(FRAME).zip(ends.zip(given))
             {
                 let (places, velocities) = out.split_at_mut(VELOCITIES.start);
                 for (column, velocity) in (0..).zip(velocities) {
-                    let speed = units.speed(column, first[VELOCITIES.start + column]);
                     let [earlier, place] = match BODY_POSITIONS.contains(&column) {
-                        true => weights.map(|[x0, v0, xn]| {
-                            x0 * first[column] + v0 * speed + xn * last[column]
-                        }),
+                        true => {
+                            let ends = units.ends(column, first, last);
+                            weights.map(|weights| guess::estimate(weights, ends))
+                        }
                         false => [before[column], now[column]],
                     };
                     places[column] = place;
@@ -449,9 +403,9 @@ impl<T: Real> Rollout<'_, '_, T> {
 
     /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 - k1) (eq. 2).
     fn position_code(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
-        let root = gather(tape, self.values, self.windows, t + 1, ROOT_POSITION);
-        let arrival = T::from_f64((t + 1) as f64 / self.transition as f64);
-        let arrival = tape.constant_with(&[self.windows, 1], |out| out.fill(arrival));
+        let root = self.given.constant(tape, t + 1, ROOT_POSITION);
+        let arrival = T::from_f64((t + 1) as f64 / self.given.transition as f64);
+        let arrival = tape.constant_with(&[self.given.windows, 1], |out| out.fill(arrival));
         let input = tape.concat(&[root, arrival])?;
         self.network.position_encoder.forward(tape, input)
     }
@@ -479,10 +433,10 @@ impl<T: Real> Network<T> for Pan2021 {
         feed: Feed,
     ) -> Result<LossTerms, AutogradError> {
         let mut rollout = self.start(tape, &batch.features)?;
-        let first = gather(tape, rollout.values, rollout.windows, 0, 0..FRAME);
+        let first = rollout.given.constant(tape, 0, 0..FRAME);
         let mut frames = vec![first];
         rollout.feed_truth(tape, 0);
-        for t in 0..rollout.transition {
+        for t in 0..rollout.given.transition {
             let frame = rollout.step(tape, t)?;
             frames.push(frame);
             match feed {
@@ -499,7 +453,7 @@ impl<T: Real> Network<T> for Pan2021 {
         batch: &Batch<T>,
     ) -> Result<Array3<T>, AutogradError> {
         let mut rollout = self.start(tape, &batch.features)?;
-        let (transition, windows) = (rollout.transition, rollout.windows);
+        let (transition, windows) = (rollout.given.transition, rollout.given.windows);
         let mut predicted = Vec::with_capacity(transition * windows * FRAME);
         rollout.feed_truth(tape, 0);
         let mark = tape.mark();

@@ -111,7 +111,7 @@ impl Units {
     }
 
     /// A standardised velocity of p^b or p^r, `number` 0 to 71, in standard deviations of the position a frame.
-    pub(super) fn speed<T: Real>(&self, number: usize, standardised: T) -> T {
+    fn speed<T: Real>(&self, number: usize, standardised: T) -> T {
         let [scale, offset] = self.speed_map(number);
         (standardised - T::from_f64(offset)) / T::from_f64(scale)
     }
@@ -120,6 +120,12 @@ impl Units {
     pub(super) fn standardised_speed<T: Real>(&self, number: usize, speed: T) -> T {
         let [scale, offset] = self.speed_map(number);
         speed * T::from_f64(scale) + T::from_f64(offset)
+    }
+
+    /// Number `number` of p^b of keyframe k1, its velocity there and p^b of k2, in standard deviations of p^b, from their frames.
+    pub(super) fn ends<T: Real>(&self, number: usize, first: &[T], last: &[T]) -> [T; 3] {
+        let speed = self.speed(number, first[VELOCITIES.start + number]);
+        [first[number], speed, last[number]]
     }
 
     /// v^b for changes of p^b a frame, `[rows, 69]`, both standardised: a difference of velocities, so means do not count.
