@@ -7,14 +7,14 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use dance_clip::turning_clip;
-use glam::DVec3;
+use glam::{DQuat, DVec3, EulerRot};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::facing::{facing_angles, facing_angles_between};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
     VELOCITY_FACTORS,
 };
-use keydance::motion::{FeatureConfig, FeatureError, features};
+use keydance::motion::{DANCE_JOINTS, FeatureConfig, FeatureError, features, mirror_image};
 use ndarray::{Array2, s};
 use proptest::prelude::*;
 
@@ -136,6 +136,77 @@ fn contacts_follow_the_world_and_the_threshold() {
     assert_eq!(labels(0.4, 0.2), [1.0; 20]);
     assert_eq!(labels(0.5, 0.2), [0.0; 20]);
     assert_eq!(labels(0.5, 0.3), [1.0; 20]);
+}
+
+#[test]
+fn the_features_of_a_mirror_image_are_the_clips_with_sides_changed_and_x_turned_round() {
+    let clip = turning_clip("drawn", 12, |t| {
+        let t = t as f64;
+        (DVec3::new(9.0 * t, 90.0 + t, 40.0 - t * t), 0.3 * t - 1.0)
+    });
+    let mut clip = clip;
+    for (t, pose) in clip.poses.iter_mut().enumerate() {
+        for (joint, rotation) in pose.rotations.iter_mut().enumerate().skip(1) {
+            let angle = 0.05 * ((t * (joint + 2)) % 9) as f64;
+            *rotation *= DQuat::from_euler(EulerRot::XYZ, angle, -0.7 * angle, 0.4);
+        }
+    }
+    let image = mirror_image(&clip);
+    assert_eq!(mirror_image(&image), clip);
+    assert!(image.skeleton.is_dance_skeleton());
+    let measure = |clip| features(clip, &FeatureConfig::default()).unwrap();
+    let (seen, image) = (measure(&clip), measure(&image));
+    let joint = |name: &str| {
+        DANCE_JOINTS
+            .iter()
+            .position(|&joint| joint == name)
+            .unwrap()
+            - 1
+    };
+    let mut compared = 0;
+    for name in &DANCE_JOINTS[1..] {
+        let partner = match (name.strip_prefix("Left"), name.strip_prefix("Right")) {
+            (Some(part), _) => format!("Right{part}"),
+            (_, Some(part)) => format!("Left{part}"),
+            _ => name.to_string(),
+        };
+        for (axis, sign) in [-1.0, 1.0, 1.0].into_iter().enumerate() {
+            for numbers in [BODY_POSITIONS, BODY_VELOCITIES] {
+                let [at, partner] =
+                    [joint(name), joint(&partner)].map(|j| numbers.start + 3 * j + axis);
+                for t in 0..12 {
+                    assert!(
+                        close(image[[t, at]], sign * seen[[t, partner]]),
+                        "{name} {t}"
+                    );
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(compared, 12 * 138);
+    for t in 0..12 {
+        for at in [ROOT_POSITION.start, ROOT_VELOCITY.start] {
+            assert!(close(image[[t, at]], -seen[[t, at]]));
+            assert!(close(image[[t, at + 1]], seen[[t, at + 1]]));
+            assert!(close(image[[t, at + 2]], seen[[t, at + 2]]));
+        }
+        assert!(close(image[[t, FACING.start]], -seen[[t, FACING.start]]));
+        for (at, partner) in [(0, 2), (1, 3), (2, 0), (3, 1)] {
+            assert_eq!(
+                image[[t, CONTACTS.start + at]],
+                seen[[t, CONTACTS.start + partner]]
+            );
+        }
+        // Trunk, left leg, right leg, right arm, left arm.
+        for (at, partner) in [(0, 0), (1, 2), (2, 1), (3, 4), (4, 3)] {
+            let at = VELOCITY_FACTORS.start + at;
+            assert!(close(
+                image[[t, at]],
+                seen[[t, VELOCITY_FACTORS.start + partner]]
+            ));
+        }
+    }
 }
 
 #[test]

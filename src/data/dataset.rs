@@ -12,7 +12,9 @@ use thiserror::Error;
 use super::config::DataConfig;
 use super::split::{Parts, check_dance_frames, split};
 use crate::motion::bvh::{self, BvhError};
-use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, features, resample};
+use crate::motion::{
+    Clip, FeatureError, Mapping, MappingError, ResampleError, features, mirror_image, resample,
+};
 
 /// A clip on the dance skeleton, with its features.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +102,19 @@ impl DanceClip {
         };
         Ok(Self {
             name: clip.name.clone(),
+            features: features(&clip, &config.features())?,
+            clip,
+        })
+    }
+
+    /// The clip in the mirror, see [`mirror_image`].
+    ///
+    /// # Errors
+    /// The image cannot be measured.
+    pub fn mirror_image(&self, config: &DataConfig) -> Result<Self, DataError> {
+        let clip = mirror_image(&self.clip);
+        Ok(Self {
+            name: self.name.clone(),
             features: features(&clip, &config.features())?,
             clip,
         })

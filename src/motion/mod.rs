@@ -10,6 +10,7 @@ pub mod features;
 pub mod fit;
 pub mod ik;
 pub mod mapping;
+pub mod mirror;
 pub mod placement;
 pub mod resample;
 pub mod rotation_fit;
@@ -19,6 +20,7 @@ pub mod velocity_factor;
 pub use clip::{Clip, Pose};
 pub use features::{FeatureConfig, FeatureError, features};
 pub use mapping::{Mapping, MappingError};
+pub use mirror::mirror_image;
 pub use resample::{ResampleError, resample};
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
 pub use velocity_factor::{

@@ -1,0 +1,69 @@
+//! The mirror image of a clip: left and right change places.
+
+use glam::{DQuat, DVec3};
+
+use super::clip::{Clip, Pose};
+use super::skeleton::{Joint, Skeleton};
+
+/// A clip on the dance skeleton as it is seen in a mirror in the plane X = 0, the skeleton and what the joints are called included:
+/// LeftHand of the image moves as RightHand of the clip does.
+pub fn mirror_image(clip: &Clip) -> Clip {
+    let partners: Vec<usize> = (0..clip.skeleton.len())
+        .map(|joint| partner(&clip.skeleton, joint))
+        .collect();
+    let joints = clip.skeleton.joints.iter().zip(&partners);
+    Clip {
+        name: clip.name.clone(),
+        skeleton: Skeleton {
+            joints: joints
+                .map(|(joint, &partner)| reflected_joint(joint, &clip.skeleton.joints[partner]))
+                .collect(),
+        },
+        frame_time: clip.frame_time,
+        poses: clip
+            .poses
+            .iter()
+            .map(|pose| Pose {
+                translations: partners
+                    .iter()
+                    .map(|&partner| reflected(pose.translations[partner]))
+                    .collect(),
+                rotations: partners
+                    .iter()
+                    .map(|&partner| reflected_rotation(pose.rotations[partner]))
+                    .collect(),
+            })
+            .collect(),
+    }
+}
+
+/// The joint on the body's other side; one in the middle is its own partner.
+fn partner(skeleton: &Skeleton, joint: usize) -> usize {
+    let name = &skeleton.joints[joint].name;
+    let other_side = match (name.strip_prefix("Left"), name.strip_prefix("Right")) {
+        (Some(part), _) => Some(format!("Right{part}")),
+        (_, Some(part)) => Some(format!("Left{part}")),
+        _ => None,
+    };
+    other_side
+        .and_then(|name| skeleton.index_of(&name))
+        .unwrap_or(joint)
+}
+
+fn reflected_joint(joint: &Joint, partner: &Joint) -> Joint {
+    Joint {
+        name: joint.name.clone(),
+        parent: joint.parent,
+        offset: reflected(partner.offset),
+        end_sites: partner.end_sites.iter().copied().map(reflected).collect(),
+    }
+}
+
+fn reflected(place: DVec3) -> DVec3 {
+    DVec3::new(-place.x, place.y, place.z)
+}
+
+/// The rotation as seen in the mirror: about the reflected axis, the other way round.
+fn reflected_rotation(rotation: DQuat) -> DQuat {
+    DQuat::from_xyzw(rotation.x, -rotation.y, -rotation.z, rotation.w)
+}
