@@ -219,7 +219,7 @@ fn part(batch: &Batch<f64>, windows: std::ops::Range<usize>) -> Batch<f64> {
     Batch {
         features: cut(&batch.features),
         poses: Some(poses),
-        total_windows: batch.total_windows,
+        ..batch.clone()
     }
 }
 

@@ -536,8 +536,8 @@ fn shards_on_tapes_of_their_own_add_up_to_the_batch() {
             .slice(s![.., windows, ..])
             .as_standard_layout()
             .into_owned(),
-        poses: None,
         total_windows: 5,
+        ..Batch::of(Array3::zeros((0, 0, 0)))
     };
     for feed in [Feed::GroundTruth, Feed::Predictions] {
         let (whole, gradient) = gradients_of(&built, &[shard(0..5)], feed);

@@ -3,13 +3,15 @@
 #[path = "common/network.rs"]
 mod network;
 
+use keydance::autograd::{Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, RootFrame, window_features};
 use keydance::evaluation::window_request;
 use keydance::models::gradient_check::generated_windows;
 use keydance::models::pan2021::Pan2021Config;
 use keydance::models::{
-    ModelConfig, Network, TrainedModel, Transition, TransitionModel, TransitionRequest,
+    Batch, Feed, ModelConfig, Network, SingleFrame, TrainedModel, Transition, TransitionModel,
+    TransitionRequest,
 };
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array2, ArrayView1, Axis, s};
@@ -278,9 +280,14 @@ fn the_control_path_adds_what_it_sees_as_documented() {
                         value.fill(0.0);
                         value[[0, column + usize::from(opened) * SEEN]] = 1.0;
                     }
-                    "control_path.0.bias" => value.fill(0.0),
-                    "control_path.1.weight" => value.fill(1.0),
-                    "control_path.2.weight" => value[[3, 0]] = 1.0,
+                    "control_path.2.weight" => {
+                        assert_eq!(value.shape(), [8, 8]);
+                        value.fill(0.0);
+                        value[[1, 0]] = 1.0;
+                    }
+                    "control_path.0.bias" | "control_path.2.bias" => value.fill(0.0),
+                    "control_path.1.weight" | "control_path.3.weight" => value.fill(1.0),
+                    "control_path.4.weight" => value[[3, 1]] = 1.0,
                     _ => {}
                 }
             }
@@ -304,6 +311,47 @@ fn the_control_path_adds_what_it_sees_as_documented() {
             }
         }
     }
+}
+
+#[test]
+fn the_loss_of_single_frames_is_the_squared_error_of_p_b_that_the_control_path_leaves() {
+    let config = with_control_path().small();
+    let mut single_frames = Vec::new();
+    let mut expected = 0.0;
+    let (features, statistics) = generated_windows(9, 2, 13).unwrap();
+    let mut built: Built<f64> = build(&config, &statistics).disturbed();
+    for (name, value) in built.parameters.values_mut() {
+        // The path alone: whatever the decoders would add is 0.
+        if name.starts_with("state_decoder.4") || name.starts_with("root_decoder.4") {
+            value.fill(0.0);
+        }
+    }
+    for (n, frame) in [(2, 1), (30, 12), (41, 41)] {
+        let (window, _) = generated_windows(n, 1, n as u64).unwrap();
+        let predicted = predict(&built, &window);
+        let missed = &predicted.slice(s![frame - 1, 0, ..69]) - &window.slice(s![frame, 0, ..69]);
+        expected += missed.iter().map(|x| x * x).sum::<f64>();
+        single_frames.push(SingleFrame { window, frame });
+    }
+    let batch = Batch {
+        single_frames,
+        // With two more in another shard.
+        total_single_frames: 5,
+        ..Batch::of(features)
+    };
+    let mut workspace = Workspace::new();
+    let mut tape = Tape::recording(&built.parameters, &mut workspace);
+    let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+    let terms = losses.unwrap().terms;
+    let (_, term) = terms
+        .iter()
+        .find(|(name, _)| *name == "single_frames")
+        .unwrap();
+    let found = tape.values(*term)[0];
+    assert!(
+        (found - expected / 5.0).abs() < 1e-9 * found,
+        "{found} {expected}"
+    );
 }
 
 #[test]

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::network::CRITICS;
-use super::{Batch, Feed, ModelConfig, ModelError, PoseWindows};
+use super::{Batch, Feed, ModelConfig, ModelError, PoseWindows, SingleFrame};
 use crate::autograd::check::{CheckReport, check_parameters};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
@@ -88,8 +88,20 @@ pub fn generated_batch(
         features.index_axis_mut(Axis(1), window).assign(&cut);
         poses.write(window, 0..=transition, &clip.clip.poses[start..]);
     }
+    let single_frames: Vec<_> = features
+        .axis_iter(Axis(1))
+        .map(|window| SingleFrame {
+            window: window
+                .insert_axis(Axis(1))
+                .as_standard_layout()
+                .into_owned(),
+            frame: transition.div_ceil(2),
+        })
+        .collect();
     let batch = Batch {
         poses: Some(poses),
+        total_single_frames: single_frames.len(),
+        single_frames,
         ..Batch::of(features)
     };
     Ok((batch, standardisation))

@@ -18,7 +18,7 @@ pub mod transition;
 pub mod weights;
 pub mod zero_velocity;
 
-pub use network::{Batch, Feed, LossTerms, Network};
+pub use network::{Batch, Feed, LossTerms, Network, SingleFrame};
 pub use pose_windows::PoseWindows;
 pub use registry::ModelConfig;
 pub use trained::TrainedModel;

@@ -17,6 +17,19 @@ pub struct Batch<T> {
     pub poses: Option<PoseWindows<T>>,
     /// Windows of the whole batch that this is a shard of: losses are means over these.
     pub total_windows: usize,
+    /// Frames of other windows, for a network that [asks](Network::single_frames) for them.
+    pub single_frames: Vec<SingleFrame<T>>,
+    /// Single frames of the whole batch.
+    pub total_single_frames: usize,
+}
+
+/// A frame with all that is given of its window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SingleFrame<T> {
+    /// Standardised features of the window, `[N + 1, 1, 154]`, of any N.
+    pub window: Array3<T>,
+    /// t of frame k1 + t, 1 to N.
+    pub frame: usize,
 }
 
 impl<T: Real> Batch<T> {
@@ -26,6 +39,8 @@ impl<T: Real> Batch<T> {
             total_windows: features.dim().1,
             features,
             poses: None,
+            single_frames: Vec::new(),
+            total_single_frames: 0,
         }
     }
 }
@@ -78,12 +93,17 @@ pub trait Network<T: Real>: Send + Sync {
         false
     }
 
+    /// How many single frames a training step shows it beside its windows.
+    fn single_frames(&self) -> usize {
+        0
+    }
+
     /// What it is fed at a step for which scheduled sampling drew `drawn`.
     fn feed(&self, drawn: Feed) -> Feed {
         drawn
     }
 
-    /// Loss terms of a batch, divided by its `total_windows`, so that the terms of the shards add up to the batch's.
+    /// Loss terms of a batch, divided by its `total_windows` (or `total_single_frames`), so that the terms of the shards add up to the batch's.
     ///
     /// # Errors
     /// Features that do not fit the network.

@@ -24,6 +24,7 @@ pub struct ExperimentConfig {
     pub data: DataConfig,
     pub model: ModelConfig,
     pub schedule: ScheduleConfig,
+    pub augmentation: AugmentationConfig,
     pub optimiser: AdamConfig,
     pub scheduled_sampling: ScheduledSamplingConfig,
     pub checkpoint: CheckpointConfig,
@@ -41,6 +42,7 @@ impl Default for ExperimentConfig {
             data: DataConfig::default(),
             model: ModelConfig::default(),
             schedule: ScheduleConfig::default(),
+            augmentation: AugmentationConfig::default(),
             optimiser: AdamConfig::default(),
             scheduled_sampling: ScheduledSamplingConfig::default(),
             checkpoint: CheckpointConfig::default(),
@@ -87,6 +89,15 @@ impl Default for ScheduleConfig {
             fraction: 1.0,
         }
     }
+}
+
+/// What is trained beside the recorded windows; the paper trains nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AugmentationConfig {
+    /// Each window that is trained is with probability 1/2 the one that a mirror shows, see [`crate::motion::mirror_image`]; the
+    /// statistics of the data are over the clips and their images.
+    pub mirror: bool,
 }
 
 /// Scheduled sampling: one draw a batch, ground truth is fed with probability beta.

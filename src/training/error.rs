@@ -9,6 +9,7 @@ use super::config_file::ConfigError;
 use super::durable::FileError;
 use super::state::StateError;
 use crate::autograd::AutogradError;
+use crate::data::DataError;
 use crate::evaluation::EvaluationError;
 use crate::models::ModelError;
 use crate::models::weights::WeightsError;
@@ -18,6 +19,9 @@ use crate::models::weights::WeightsError;
 pub enum TrainingError {
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A clip's mirror image cannot be measured.
+    #[error(transparent)]
+    Data(#[from] Box<DataError>),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(

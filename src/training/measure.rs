@@ -1,5 +1,6 @@
 //! How fast a training step is: the very step that a training runs, on made-up windows.
 
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use glam::{DQuat, DVec3};
@@ -9,8 +10,8 @@ use serde::Serialize;
 
 use super::config::ExperimentConfig;
 use super::error::TrainingError;
-use super::schedule::BatchPlan;
-use super::step::{StepInput, Stepper, TrainingClip, TrainingWindows};
+use super::single_frames;
+use super::step::{StepInput, StepPlan, Stepper, TrainingClip, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{RootFrame, Standardisation, Window};
@@ -30,7 +31,7 @@ pub struct MeasuredStep {
     poses: Vec<Pose>,
     adam: Adam<f32>,
     stepper: Stepper,
-    plan: BatchPlan,
+    plan: StepPlan,
     learning_rate: f64,
     done: u64,
 }
@@ -62,6 +63,9 @@ impl MeasuredStep {
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
         let network = config.model.build(&mut init, &standardisation)?;
+        let count = network.single_frames();
+        let single_frames =
+            single_frames::draw(&[clip.nrows()], count, &mut streams.single_frames(0));
         Ok(Self {
             streams,
             network,
@@ -71,7 +75,8 @@ impl MeasuredStep {
             standardisation,
             clip,
             poses,
-            plan: BatchPlan {
+            plan: StepPlan {
+                single_frames,
                 length: frames,
                 windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
             },
@@ -87,8 +92,8 @@ impl MeasuredStep {
     pub fn run(&mut self) -> Result<Duration, TrainingError> {
         let windows = TrainingWindows {
             clips: vec![TrainingClip {
-                features: &self.clip,
-                poses: &self.poses,
+                features: Cow::Borrowed(&self.clip),
+                poses: Cow::Borrowed(&self.poses),
             }],
             standardisation: self.standardisation.clone(),
             root_frame: RootFrame::World,

@@ -16,6 +16,7 @@ pub mod measure;
 mod run_folder;
 mod run_status;
 mod schedule;
+mod single_frames;
 pub mod state;
 mod step;
 mod streams;
@@ -24,8 +25,8 @@ mod trainer;
 mod validation;
 
 pub use config::{
-    CheckpointConfig, ExperimentConfig, LogConfig, ScheduleConfig, ScheduledSamplingConfig,
-    ValueError,
+    AugmentationConfig, CheckpointConfig, ExperimentConfig, LogConfig, ScheduleConfig,
+    ScheduledSamplingConfig, ValueError,
 };
 pub use config_file::ConfigError;
 pub use durable::FileError;

@@ -103,6 +103,11 @@ impl Schedule {
         schedule
     }
 
+    /// Frames of the training clips.
+    pub(super) fn clip_frames(&self) -> &[usize] {
+        &self.clip_frames
+    }
+
     pub fn epochs(&self) -> usize {
         self.epochs.len()
     }

@@ -1,5 +1,6 @@
 //! One step: a batch is cut and standardised, its shards run forwards and backwards, Adam moves the weights.
 
+use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 
 use ndarray::{Array2, Array3, Axis};
@@ -8,12 +9,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Serialize, Serializer};
 
 use super::error::TrainingError;
-use super::schedule::{BatchPlan, parts};
+use super::schedule::parts;
+use super::single_frames::SingleFramePlan;
 use super::streams::Streams;
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
-use crate::data::{RootFrame, Standardisation, Window};
+use crate::data::{DanceClip, RootFrame, Standardisation, Window};
 use crate::evaluation::Evaluation;
-use crate::models::{Batch, Feed, Network, PoseWindows};
+use crate::models::{Batch, Feed, Network, PoseWindows, SingleFrame};
 use crate::motion::Pose;
 use crate::motion::features::FEATURES;
 use crate::optim::Adam;
@@ -65,7 +67,7 @@ fn by_name<S: Serializer>(
     serializer.collect_map(losses.iter().copied())
 }
 
-/// The training clips, and how their windows become network input.
+/// The training clips, after them their mirror images where those are trained too, and how their windows become network input.
 pub(super) struct TrainingWindows<'d> {
     pub clips: Vec<TrainingClip<'d>>,
     pub standardisation: Standardisation,
@@ -73,11 +75,26 @@ pub(super) struct TrainingWindows<'d> {
 }
 
 /// One of them.
-#[derive(Clone, Copy)]
 pub(super) struct TrainingClip<'d> {
     /// `[frames, 154]`, not standardised.
-    pub features: &'d Array2<f64>,
-    pub poses: &'d [Pose],
+    pub features: Cow<'d, Array2<f64>>,
+    pub poses: Cow<'d, [Pose]>,
+}
+
+impl<'d> TrainingClip<'d> {
+    pub fn of(clip: &'d DanceClip) -> Self {
+        Self {
+            features: Cow::Borrowed(&clip.features),
+            poses: Cow::Borrowed(&clip.clip.poses),
+        }
+    }
+
+    pub fn owning(clip: DanceClip) -> Self {
+        Self {
+            features: Cow::Owned(clip.features),
+            poses: Cow::Owned(clip.clip.poses),
+        }
+    }
 }
 
 impl TrainingWindows<'_> {
@@ -85,7 +102,7 @@ impl TrainingWindows<'_> {
     fn features(&self, windows: &[Window], length: usize) -> Array3<f32> {
         let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
         for (k, window) in windows.iter().enumerate() {
-            let clip = self.clips[window.clip].features;
+            let clip = &self.clips[window.clip].features;
             let cut = self.root_frame.window_features(clip, window.start, length);
             features.index_axis_mut(Axis(1), k).assign(
                 &self
@@ -95,6 +112,17 @@ impl TrainingWindows<'_> {
             );
         }
         features
+    }
+
+    /// Single frames with the standardised features of their windows.
+    fn single_frames(&self, plans: &[SingleFramePlan]) -> Vec<SingleFrame<f32>> {
+        plans
+            .iter()
+            .map(|plan| SingleFrame {
+                window: self.features(&[plan.window], plan.length),
+                frame: plan.frame,
+            })
+            .collect()
     }
 
     /// Poses of the same windows; none where a clip has none of its own.
@@ -108,6 +136,40 @@ impl TrainingWindows<'_> {
     }
 }
 
+/// What a step trains.
+#[derive(Debug, Clone)]
+pub(super) struct StepPlan {
+    /// N of the windows.
+    pub length: usize,
+    pub windows: Vec<Window>,
+    pub single_frames: Vec<SingleFramePlan>,
+}
+
+/// A part of it, computed by itself.
+#[derive(Clone, Copy)]
+struct Shard<'s> {
+    /// From 0.
+    index: usize,
+    windows: &'s [Window],
+    single_frames: &'s [SingleFramePlan],
+}
+
+impl StepPlan {
+    /// The plan in `count` parts or, where it has fewer windows, one of each.
+    fn shards(&self, count: usize) -> Vec<Shard<'_>> {
+        let count = count.min(self.windows.len());
+        parts(self.windows.len(), count)
+            .zip(parts(self.single_frames.len(), count))
+            .enumerate()
+            .map(|(index, (windows, single_frames))| Shard {
+                index,
+                windows: &self.windows[windows],
+                single_frames: &self.single_frames[single_frames],
+            })
+            .collect()
+    }
+}
+
 /// What a step is given.
 pub(super) struct StepInput<'s> {
     pub network: &'s dyn Network<f32>,
@@ -115,7 +177,7 @@ pub(super) struct StepInput<'s> {
     pub streams: Streams,
     /// Steps done before.
     pub step: u64,
-    pub plan: &'s BatchPlan,
+    pub plan: &'s StepPlan,
     pub feed: Feed,
     pub learning_rate: f64,
 }
@@ -181,32 +243,20 @@ impl Stepper {
         parameters: &mut Parameters<f32>,
         adam: &mut Adam<f32>,
     ) -> Result<(Losses, f64), TrainingError> {
-        let shards: Vec<&[Window]> = parts(input.plan.windows.len(), self.gradients.len())
-            .map(|range| &input.plan.windows[range])
-            .collect();
+        let shards = input.plan.shards(self.gradients.len());
         let (workspaces, gradients) = (&self.workspaces, &mut self.gradients);
         let (before, pool) = (&*parameters, &self.pool);
         let losses: Vec<Result<Losses, AutogradError>> = pool.install(|| {
             gradients
                 .par_iter_mut()
                 .zip(&shards)
-                .enumerate()
-                .filter(|(_, (_, windows))| !windows.is_empty())
-                .map(|(shard, (gradients, windows))| {
+                .map(|(gradients, shard)| {
                     let free = workspaces
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
                         .pop();
                     let mut workspace = free.unwrap_or_default();
-                    let losses = run_shard(
-                        input,
-                        before,
-                        &mut workspace,
-                        shard,
-                        windows,
-                        gradients,
-                        false,
-                    );
+                    let losses = run_shard(input, before, &mut workspace, *shard, gradients, false);
                     workspaces
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
@@ -252,28 +302,15 @@ impl Stepper {
         &mut self,
         input: &StepInput<'_>,
         parameters: &Parameters<f32>,
-        shards: &[&[Window]],
+        shards: &[Shard<'_>],
     ) -> Option<AutogradError> {
         let mut workspace = Workspace::new();
         // One sum for all shards: each may be finite where their sum is not.
         let gradients = self.gradients.first_mut()?;
         gradients.set_zero();
-        let with_windows = shards
+        shards
             .iter()
-            .enumerate()
-            .filter(|(_, windows)| !windows.is_empty());
-        with_windows
-            .map(|(shard, windows)| {
-                run_shard(
-                    input,
-                    parameters,
-                    &mut workspace,
-                    shard,
-                    windows,
-                    gradients,
-                    true,
-                )
-            })
+            .map(|shard| run_shard(input, parameters, &mut workspace, *shard, gradients, true))
             .find_map(Result::err)
     }
 }
@@ -293,21 +330,22 @@ fn run_shard(
     input: &StepInput<'_>,
     parameters: &Parameters<f32>,
     workspace: &mut Workspace<f32>,
-    shard: usize,
-    windows: &[Window],
+    shard: Shard<'_>,
     gradients: &mut Gradients<f32>,
     trace: bool,
 ) -> Result<Losses, AutogradError> {
     let batch = Batch {
-        features: input.windows.features(windows, input.plan.length),
+        features: input.windows.features(shard.windows, input.plan.length),
         poses: match input.network.reads_poses() {
-            true => input.windows.poses(windows, input.plan.length),
+            true => input.windows.poses(shard.windows, input.plan.length),
             false => None,
         },
         total_windows: input.plan.windows.len(),
+        single_frames: input.windows.single_frames(shard.single_frames),
+        total_single_frames: input.plan.single_frames.len(),
     };
     let mut tape = Tape::recording(parameters, workspace)
-        .with_dropout(input.streams.dropout(input.step, shard));
+        .with_dropout(input.streams.dropout(input.step, shard.index));
     if trace {
         tape = tape.with_trace();
     }

@@ -33,6 +33,16 @@ impl Streams {
         self.stream("sampling", &[step])
     }
 
+    /// Which windows of a step's batch are seen in a mirror.
+    pub fn mirroring(&self, step: u64) -> ChaCha8Rng {
+        self.stream("mirroring", &[step])
+    }
+
+    /// The frames that a step trains one by one.
+    pub fn single_frames(&self, step: u64) -> ChaCha8Rng {
+        self.stream("single_frames", &[step])
+    }
+
     /// Key of the dropout masks of a shard at a step.
     pub fn dropout(&self, step: u64, shard: usize) -> u64 {
         self.stream("dropout", &[step, shard as u64]).next_u64()
@@ -65,6 +75,8 @@ mod tests {
             for index in 0..4 {
                 assert!(firsts.insert(streams.shuffling(index).next_u64()));
                 assert!(firsts.insert(streams.sampling(index as u64).next_u64()));
+                assert!(firsts.insert(streams.mirroring(index as u64).next_u64()));
+                assert!(firsts.insert(streams.single_frames(index as u64).next_u64()));
                 for shard in 0..4 {
                     assert!(firsts.insert(streams.dropout(index as u64, shard)));
                 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rand::RngExt as _;
+use rayon::prelude::*;
 
 use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::config::ExperimentConfig;
@@ -15,8 +16,9 @@ use super::log::Log;
 use super::manifest::{self, Manifest, RunState};
 use super::run_folder::RunFolder;
 use super::schedule::{BatchPlan, Schedule};
+use super::single_frames;
 use super::state::{self, Header};
-use super::step::{StepInput, StepReport, Stepper, TrainingClip, TrainingWindows};
+use super::step::{StepInput, StepPlan, StepReport, Stepper, TrainingClip, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{DanceClip, Dataset, Standardisation};
@@ -97,10 +99,15 @@ impl<'d> Trainer<'d> {
             cause,
         })?;
         let config_toml = config.to_toml()?;
-        let clips = dataset.train.iter().map(|clip| TrainingClip {
-            features: &clip.features,
-            poses: &clip.clip.poses,
-        });
+        let mut clips: Vec<_> = dataset.train.iter().map(TrainingClip::of).collect();
+        if config.augmentation.mirror {
+            let images: Result<Vec<_>, _> = dataset
+                .train
+                .par_iter()
+                .map(|clip| clip.mirror_image(&config.data).map_err(Box::new))
+                .collect();
+            clips.extend(images?.into_iter().map(TrainingClip::owning));
+        }
         let streams = Streams::new(config.seed);
         let frames: Vec<usize> = dataset.train.iter().map(DanceClip::frames).collect();
         let schedule = Schedule::new(&frames, &config.schedule, streams);
@@ -117,7 +124,7 @@ impl<'d> Trainer<'d> {
         // Of the longest transitions that are trained.
         let longest = frames.iter().map(|frames| frames.saturating_sub(1)).max();
         let transition = config.schedule.max_len.min(longest.unwrap_or(0));
-        let views = dataset.train.iter().map(|clip| clip.features.view());
+        let views = clips.iter().map(|clip| clip.features.view());
         let standardisation = root_frame.standardisation(views, transition);
         if let Some(validation) = &config.validation {
             validation.check(dataset)?;
@@ -129,7 +136,7 @@ impl<'d> Trainer<'d> {
             config_digest: checkpoint::file_digest(config_toml.as_bytes()),
             config_toml,
             windows: TrainingWindows {
-                clips: clips.collect(),
+                clips,
                 standardisation,
                 root_frame,
             },
@@ -344,9 +351,10 @@ impl<'d> Trainer<'d> {
         Ok(Outcome::Finished)
     }
 
-    fn step(&mut self, epoch: usize, plan: &BatchPlan) -> Result<StepReport, TrainingError> {
+    fn step(&mut self, epoch: usize, batch: &BatchPlan) -> Result<StepReport, TrainingError> {
         let start = Instant::now();
         let step = self.steps_done();
+        let plan = &self.plan(batch, step);
         let beta = self
             .schedule
             .teacher_forcing(&self.config.scheduled_sampling, step);
@@ -391,6 +399,31 @@ impl<'d> Trainer<'d> {
             frame_steps_per_second: frames as f64 / seconds.max(1e-9),
             validation: None,
         })
+    }
+
+    /// A batch of the schedule with the single frames of its step, each of all these windows with probability 1/2 its mirror image
+    /// where the config says so.
+    fn plan(&self, batch: &BatchPlan, step: u64) -> StepPlan {
+        let count = self.network.single_frames();
+        let mut plan = StepPlan {
+            length: batch.length,
+            windows: batch.windows.clone(),
+            single_frames: single_frames::draw(
+                self.schedule.clip_frames(),
+                count,
+                &mut self.streams.single_frames(step),
+            ),
+        };
+        if self.config.augmentation.mirror {
+            let mut draws = self.streams.mirroring(step);
+            let single_frames = plan.single_frames.iter_mut().map(|plan| &mut plan.window);
+            for window in plan.windows.iter_mut().chain(single_frames) {
+                if draws.random() {
+                    window.clip += self.dataset.train.len();
+                }
+            }
+        }
+        plan
     }
 
     /// Scores the weights as they are on the validation clips where it is time to.

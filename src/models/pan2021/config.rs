@@ -37,6 +37,8 @@ pub struct LossWeights {
     /// 0 for "Without L_key".
     pub key: f64,
     pub vfac: f64,
+    /// Of single frames, with a control path; not in the paper.
+    pub single_frames: f64,
     /// m of eq. 10: frames that a keyframe affects.
     pub key_frames: usize,
 }
@@ -49,6 +51,7 @@ impl Default for LossWeights {
             root: 0.15,
             key: 0.2,
             vfac: 0.15,
+            single_frames: 1.0,
             key_frames: 5,
         }
     }
@@ -72,6 +75,8 @@ pub struct Pan2021Config {
     pub output: Output,
     /// A feed-forward path from the controls around each frame to what is added to its estimate; not in the paper.
     pub control_path: bool,
+    /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
+    pub single_frames: usize,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,
     /// Codes, LSTM states, Transformer tokens, second hidden layer of the decoders.
@@ -97,6 +102,7 @@ impl Default for Pan2021Config {
             root_frame: RootFrame::World,
             output: Output::Absolute,
             control_path: false,
+            single_frames: 512,
             hidden: 512,
             code: 256,
             window: 7,
@@ -160,6 +166,12 @@ impl Pan2021Config {
                 return complain(format!("model.{key} = {value}: expected 1 to {most}"));
             }
         }
+        if self.single_frames > 65_536 {
+            return complain(format!(
+                "model.single_frames = {}: expected 0 to 65536",
+                self.single_frames
+            ));
+        }
         if !self.code.is_multiple_of(self.heads) {
             return complain(format!(
                 "model.code = {}: expected a multiple of model.heads = {}",
@@ -190,6 +202,7 @@ impl Pan2021Config {
             root,
             key,
             vfac,
+            single_frames,
             ..
         } = self.loss;
         for (name, value) in [
@@ -198,6 +211,7 @@ impl Pan2021Config {
             ("root", root),
             ("key", key),
             ("vfac", vfac),
+            ("single_frames", single_frames),
         ] {
             if !(value.is_finite() && value >= 0.0) {
                 return complain(format!("model.loss.{name} = {value}: expected 0 or more"));

@@ -29,13 +29,24 @@ struct Frames {
     windows: usize,
 }
 
-/// All terms; `frames` are the true frame k1 and the predictions of k1 + 1 .. k2, each `[windows, 149]`.
+/// What was predicted of a batch.
+pub(super) struct Predicted<'f> {
+    /// The true frame k1 and the predictions of k1 + 1 .. k2, each `[windows, 149]`.
+    pub frames: &'f [Var],
+    /// The loss of the single frames, `[1]`, where the network has a path for them.
+    pub single_frames: Option<Var>,
+}
+
+/// All terms.
 pub(super) fn terms<T: Real>(
     tape: &mut Tape<'_, T>,
     units: &Units,
     config: &Pan2021Config,
     batch: &Batch<T>,
-    frames: &[Var],
+    Predicted {
+        frames,
+        single_frames,
+    }: Predicted<'_>,
 ) -> Result<LossTerms, AutogradError> {
     let (transition, windows) = (frames.len() - 1, batch.features.dim().1);
     let flat = [transition * windows, FRAME];
@@ -73,6 +84,9 @@ pub(super) fn terms<T: Real>(
     if config.velocity_factor {
         let vfac = velocity_factor(tape, units, batch, velocities)?;
         all.push(("vfac", weights.vfac, tape.affine(vfac, mean, 0.0)));
+    }
+    if let Some(loss) = single_frames {
+        all.push(("single_frames", weights.single_frames, loss));
     }
     LossTerms::weighted(tape, &all, None)
 }

@@ -426,6 +426,13 @@ impl<T: Real> Rollout<'_, '_, T> {
 }
 
 impl<T: Real> Network<T> for Pan2021 {
+    fn single_frames(&self) -> usize {
+        match self.control_path {
+            Some(_) => self.config.single_frames,
+            None => 0,
+        }
+    }
+
     fn losses(
         &self,
         tape: &mut Tape<'_, T>,
@@ -444,7 +451,15 @@ impl<T: Real> Network<T> for Pan2021 {
                 Feed::Predictions => rollout.feed_prediction(tape, t + 1, frame)?,
             }
         }
-        losses::terms(tape, &self.units, &self.config, batch, &frames)
+        let single_frames = match &self.control_path {
+            Some(path) => Some(path.loss(tape, &self.units, batch)?),
+            None => None,
+        };
+        let frames = losses::Predicted {
+            frames: &frames,
+            single_frames,
+        };
+        losses::terms(tape, &self.units, &self.config, batch, frames)
     }
 
     fn predict(
