@@ -314,7 +314,7 @@ fn the_control_path_adds_what_it_sees_as_documented() {
 }
 
 #[test]
-fn the_loss_of_single_frames_is_the_squared_error_of_p_b_that_the_control_path_leaves() {
+fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_path_leaves() {
     let config = with_control_path().small();
     let mut single_frames = Vec::new();
     let mut expected = 0.0;
@@ -330,7 +330,11 @@ fn the_loss_of_single_frames_is_the_squared_error_of_p_b_that_the_control_path_l
         let (window, _) = generated_windows(n, 1, n as u64).unwrap();
         let predicted = predict(&built, &window);
         let missed = &predicted.slice(s![frame - 1, 0, ..69]) - &window.slice(s![frame, 0, ..69]);
-        expected += missed.iter().map(|x| x * x).sum::<f64>();
+        let scaled = missed
+            .iter()
+            .zip(&statistics.std)
+            .map(|(x, std)| x * std / statistics.position_scale);
+        expected += (scaled.map(|x| x * x).sum::<f64>() + 1e-8).sqrt();
         single_frames.push(SingleFrame { window, frame });
     }
     let batch = Batch {

@@ -51,7 +51,7 @@ impl Default for LossWeights {
             root: 0.15,
             key: 0.2,
             vfac: 0.15,
-            single_frames: 1.0,
+            single_frames: 10.0,
             key_frames: 5,
         }
     }

@@ -5,7 +5,7 @@ use rand::Rng;
 use super::config::Pan2021Config;
 use super::given::Given;
 use super::guess::{Estimator, estimate};
-use super::units::Units;
+use super::units::{NORM_EPS, Units};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::Batch;
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, VELOCITY_FACTORS};
@@ -15,7 +15,6 @@ use crate::nn::{Initialiser, LastLayer, Linear, Mlp};
 const OFFSETS: [isize; 13] = [-20, -12, -7, -4, -2, -1, 0, 1, 2, 4, 7, 12, 20];
 /// From rad a frame to numbers about 1.
 const TURN_SCALE: f64 = 30.0;
-
 /// What is dropped of the last hidden layer while single frames are trained.
 const DROPOUT: f64 = 0.2;
 
@@ -75,8 +74,8 @@ impl ControlPath {
         tape.mul(corrections, seen.open)
     }
 
-    /// The squared error of p^b with the corrections, standardised, summed over its 69 numbers and averaged over the batch's single
-    /// frames: `[1]`.
+    /// The distance of p^b with the corrections from the true one, in s_p, the mean over the batch's single frames: `[1]`. What LRP
+    /// measures.
     ///
     /// # Errors
     /// Windows of another shape than they are to have.
@@ -117,8 +116,9 @@ impl ControlPath {
         let corrections = self.last.forward(tape, hidden)?;
         let corrections = tape.mul(corrections, seen.open)?;
         let error = tape.sub(missed, corrections)?;
-        let square = tape.square(error);
-        let sum = tape.sum(square);
+        let error = units.in_scale(tape, error)?;
+        let distances = tape.vector_norm(error, NORM_EPS)?;
+        let sum = tape.sum(distances);
         let mean = 1.0 / batch.total_single_frames.max(1) as f64;
         Ok(tape.affine(sum, mean, 0.0))
     }

@@ -139,6 +139,19 @@ impl Units {
         tape.mul(changes, scales)
     }
 
+    /// Differences of p^b in s_p, the same length for every number, from standardised ones, `[rows, 69]`.
+    pub(super) fn in_scale<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        differences: Var,
+    ) -> Result<Var, AutogradError> {
+        let scales: Vec<f64> = BODY_POSITIONS
+            .map(|i| self.position_std[i] / self.position_scale)
+            .collect();
+        let scales = constant(tape, &[scales.len()], &scales);
+        tape.mul(differences, scales)
+    }
+
     /// Scale and offset from position deviations a frame to a standardised velocity.
     fn speed_map(&self, number: usize) -> [f64; 2] {
         let std = self.velocity_std[number];
