@@ -666,7 +666,7 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         let built = model.build(&mut init, &Standardisation::fit([]));
         built.err().unwrap().to_string()
     };
-    let cases: [(Change, &str); 10] = [
+    let cases: [(Change, &str); 12] = [
         (
             |config| config.lstms = 3,
             "model.lstms = 3: expected 1 or 2",
@@ -698,6 +698,14 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         (
             |config| config.dropout = 1.0,
             "model.dropout = 1: expected at least 0 and below 1",
+        ),
+        (
+            |config| config.single_frames = 65_537,
+            "model.single_frames = 65537: expected 0 to 65536",
+        ),
+        (
+            |config| config.loss.single_frames = f64::NAN,
+            "model.loss.single_frames = NaN: expected 0 or more",
         ),
         (
             |config| config.loss.root = -1.0,

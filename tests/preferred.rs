@@ -337,7 +337,7 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
         expected += (scaled.map(|x| x * x).sum::<f64>() + 1e-8).sqrt();
         single_frames.push(SingleFrame { window, frame });
     }
-    let batch = Batch {
+    let mut batch = Batch {
         single_frames,
         // With two more in another shard.
         total_single_frames: 5,
@@ -356,6 +356,13 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
         (found - expected / 5.0).abs() < 1e-9 * found,
         "{found} {expected}"
     );
+    for frame in [0, 42] {
+        batch.single_frames[2].frame = frame;
+        let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+        let error = losses.unwrap_err().to_string();
+        let named = format!("frame {frame} of a window");
+        assert!(error.contains(&named), "{error}");
+    }
 }
 
 #[test]

@@ -40,8 +40,33 @@ struct Seen {
     open: Var,
 }
 
-/// A frame of a window: the window's batch and estimator, the frame, the window.
-type Place<'a, T> = (Given<'a, T>, &'a Estimator, usize, usize);
+/// Frame k1 + `t` of a window of a batch.
+#[derive(Clone, Copy)]
+struct Place<'f, T> {
+    given: Given<'f, T>,
+    estimator: Estimator,
+    t: usize,
+    window: usize,
+}
+
+impl<'f, T: Real> Place<'f, T> {
+    /// Frame k1 + `t` of the same window, 154 numbers.
+    fn row(&self, t: usize) -> &'f [T] {
+        self.given.row(t, self.window)
+    }
+
+    /// Keyframes k1 and k2.
+    fn keyframes(&self) -> [&'f [T]; 2] {
+        [0, self.given.transition].map(|t| self.row(t))
+    }
+
+    /// The estimate of p^b.
+    fn estimate(&self, units: &Units) -> [T; BODY_POSITIONS.end] {
+        let [first, last] = self.keyframes();
+        let weights = self.estimator.weights(self.t).map(T::from_f64);
+        std::array::from_fn(|number| estimate(weights, units.ends(number, first, last)))
+    }
+}
 
 impl ControlPath {
     pub fn new<T: Real, R: Rng>(init: &mut Initialiser<'_, T, R>, config: &Pan2021Config) -> Self {
@@ -62,11 +87,18 @@ impl ControlPath {
         &self,
         tape: &mut Tape<'_, T>,
         units: &Units,
-        estimator: &Estimator,
+        estimator: Estimator,
         given: Given<'_, T>,
     ) -> Result<Var, AutogradError> {
         let places: Vec<_> = (1..=given.transition)
-            .flat_map(|t| (0..given.windows).map(move |window| (given, estimator, t, window)))
+            .flat_map(|t| {
+                (0..given.windows).map(move |window| Place {
+                    given,
+                    estimator,
+                    t,
+                    window,
+                })
+            })
             .collect();
         let seen = self.seen(tape, units, &places);
         let hidden = self.hidden.forward(tape, seen.input)?;
@@ -78,35 +110,42 @@ impl ControlPath {
     /// measures.
     ///
     /// # Errors
-    /// Windows of another shape than they are to have.
+    /// Windows of another shape than they are to have, or a frame beyond its window.
     pub fn loss<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         units: &Units,
         batch: &Batch<T>,
     ) -> Result<Var, AutogradError> {
-        let frames = &batch.single_frames;
-        let givens: Vec<Given<'_, T>> = frames
+        let places = batch
+            .single_frames
             .iter()
-            .map(|frame| Given::new(&frame.window))
-            .collect::<Result<_, _>>()?;
-        let estimators: Vec<_> = givens
-            .iter()
-            .map(|given| Estimator::new(given.transition))
-            .collect();
-        let places: Vec<_> = frames
-            .iter()
-            .zip(givens.iter().zip(&estimators))
-            .map(|(frame, (given, estimator))| (*given, estimator, frame.frame, 0))
-            .collect();
+            .map(|frame| {
+                let given = Given::new(&frame.window)?;
+                if !(1..=given.transition).contains(&frame.frame) {
+                    return Err(AutogradError::Argument {
+                        operation: "pan2021",
+                        shape: frame.window.shape().to_vec(),
+                        argument: format!("frame {} of a window", frame.frame),
+                        expected: "1 to N",
+                    });
+                }
+                Ok(Place {
+                    given,
+                    estimator: Estimator::new(given.transition),
+                    t: frame.frame,
+                    window: 0,
+                })
+            })
+            .collect::<Result<Vec<_>, AutogradError>>()?;
         let numbers = BODY_POSITIONS.len();
         let missed = tape.constant_with(&[places.len(), numbers], |out| {
-            for (out, &(given, estimator, t, window)) in out.chunks_exact_mut(numbers).zip(&places)
-            {
-                let [first, last, now] = [0, given.transition, t].map(|t| given.row(t, window));
-                let weights = estimator.weights(t).map(T::from_f64);
-                for (number, out) in out.iter_mut().enumerate() {
-                    *out = now[number] - estimate(weights, units.ends(number, first, last));
+            for (out, place) in out.chunks_exact_mut(numbers).zip(&places) {
+                let truth = &place.row(place.t)[BODY_POSITIONS];
+                for ((out, &truth), estimate) in
+                    out.iter_mut().zip(truth).zip(place.estimate(units))
+                {
+                    *out = truth - estimate;
                 }
             }
         });
@@ -132,11 +171,11 @@ impl ControlPath {
         let half = seen(self.velocity_factor);
         let open: Vec<T> = places
             .iter()
-            .map(|&(_, estimator, t, _)| T::from_f64(estimator.deviation(t)))
+            .map(|place| T::from_f64(place.estimator.deviation(place.t)))
             .collect();
         let input = tape.constant_with(&[places.len(), 2 * half], |out| {
             let mut seen = Vec::with_capacity(half);
-            for ((out, &place), &open) in out.chunks_exact_mut(2 * half).zip(places).zip(&open) {
+            for ((out, place), &open) in out.chunks_exact_mut(2 * half).zip(places).zip(&open) {
                 seen.clear();
                 self.see(units, place, &mut seen);
                 let (plain, opened) = out.split_at_mut(half);
@@ -153,15 +192,10 @@ impl ControlPath {
     }
 
     /// Appends what is seen of a frame.
-    fn see<T: Real>(
-        &self,
-        units: &Units,
-        (given, estimator, t, window): Place<'_, T>,
-        seen: &mut Vec<T>,
-    ) {
-        let n = given.transition;
-        let [first, last, now] = [0, n, t].map(|t| given.row(t, window));
-        let near = |offset: isize| given.row(t.saturating_add_signed(offset).min(n), window);
+    fn see<T: Real>(&self, units: &Units, place: &Place<'_, T>, seen: &mut Vec<T>) {
+        let (t, n) = (place.t, place.given.transition);
+        let ([first, last], now) = (place.keyframes(), place.row(t));
+        let near = |offset: isize| place.row(t.saturating_add_signed(offset).min(n));
         let turn = (last[FACING.start] - first[FACING.start]) / T::from_f64(n as f64);
         let facing = units.facing(first[FACING.start] + turn * T::from_f64(t as f64));
         let (sin, cos) = facing.sin_cos();
@@ -181,11 +215,8 @@ impl ControlPath {
             }
         }
         seen.push(turn * T::from_f64(units.facing_std * TURN_SCALE));
-        let weights = estimator.weights(t).map(T::from_f64);
-        seen.extend(
-            BODY_POSITIONS.map(|number| estimate(weights, units.ends(number, first, last))),
-        );
-        let [to_first, to_last] = estimator.likenesses(t).map(T::from_f64);
+        seen.extend(place.estimate(units));
+        let [to_first, to_last] = place.estimator.likenesses(t).map(T::from_f64);
         seen.extend(first[BODY_POSITIONS].iter().map(|&x| to_first * x));
         seen.extend(last[BODY_POSITIONS].iter().map(|&x| to_last * x));
     }

@@ -176,7 +176,7 @@ impl Pan2021 {
         };
         let estimator = Estimator::new(transition);
         let corrections = match &self.control_path {
-            Some(path) => Some(path.corrections(tape, &self.units, &estimator, given)?),
+            Some(path) => Some(path.corrections(tape, &self.units, estimator, given)?),
             None => None,
         };
         Ok(Rollout {
