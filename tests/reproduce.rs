@@ -280,6 +280,8 @@ fn rows_that_are_missing_keep_their_lines_with_a_dash() {
     }
     // Not a config of ours: the paper's line stands alone.
     assert_eq!(of("Condition-FC").len(), 1);
+    let figure = fs::read_to_string(place.path().join("results/lrp.svg")).unwrap();
+    assert!(figure.contains("Whole model, paper"), "{figure}");
 }
 
 #[test]

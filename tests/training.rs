@@ -586,6 +586,25 @@ fn the_overfit_check_trains_on_one_clip_and_tests_on_none() {
 }
 
 #[test]
+fn the_check_on_unseen_dancers_trains_the_preferred_control_path_and_nothing_else() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let load =
+        |file: &str, sets: &[String]| ExperimentConfig::load(&folder.join(file), sets).unwrap();
+    let check = load("checks/unseen_dancers.toml", &[]);
+    let no_other_loss =
+        ["rec", "con", "root", "key", "vfac"].map(|loss| format!("model.loss.{loss}=0"));
+    let preferred = load("preferred/whole_model.toml", &no_other_loss);
+    assert_eq!(
+        (check.model, check.augmentation),
+        (preferred.model, preferred.augmentation)
+    );
+    assert!(matches!(
+        check.data.split,
+        keydance::data::Split::UnseenDancers(_)
+    ));
+}
+
+#[test]
 fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
     let data = dataset();
     let sets = [

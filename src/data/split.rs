@@ -37,19 +37,37 @@ pub(super) fn split(
         });
     }
     let (train, test) = match &config.split {
-        Split::Dance => {
+        Split::Dance | Split::UnseenDancers(_) if names.len() != DANCE_TRAIN.0 + DANCE_TEST.0 => {
             let clips = DANCE_TRAIN.0 + DANCE_TEST.0;
-            if names.len() != clips {
-                let found = format!(
-                    "holds {}; for other data, set data.split = {{ share = 0.8 }}",
-                    names.len()
-                );
-                return Err(misfit(
-                    format!("split = \"dance\", which has {clips} clips"),
-                    found,
-                ));
+            let found = format!(
+                "holds {}; for other data, set data.split = {{ share = 0.8 }}",
+                names.len()
+            );
+            return Err(misfit(
+                format!("the dance split, which has {clips} clips"),
+                found,
+            ));
+        }
+        Split::Dance => cut(names, DANCE_TRAIN.0),
+        Split::UnseenDancers(dancers) => {
+            let (train, _) = cut(names, DANCE_TRAIN.0);
+            for dancer in dancers {
+                if !train.iter().any(|name| dancer_of(name) == dancer) {
+                    let found = "has no such clip among the dance split's training clips";
+                    return Err(misfit(format!("that clips show {dancer}"), found.into()));
+                }
             }
-            cut(names, DANCE_TRAIN.0)
+            let (test, train): (Vec<_>, Vec<_>) = train
+                .into_iter()
+                .partition(|name| dancers.iter().any(|dancer| dancer_of(name) == dancer));
+            if train.is_empty() || test.is_empty() {
+                return Err(DataError::Config {
+                    key: "split.unseen_dancers",
+                    value: format!("{dancers:?}"),
+                    expected: "at least one dancer, and not all of them",
+                });
+            }
+            (train, test)
         }
         Split::Share(share) => {
             if !(*share > 0.0 && *share < 1.0) {
@@ -92,6 +110,11 @@ pub(super) fn split(
         validation,
         test,
     })
+}
+
+/// The dancer of a clip of the paper's data set: what stands before the first "_" of its name.
+fn dancer_of(name: &str) -> &str {
+    name.split('_').next().unwrap_or(name)
 }
 
 /// The rule that gives the paper's training frames: number the sorted names from 1, sort `"{number}_{name}"` bytewise, the first `count` train.
@@ -194,6 +217,46 @@ mod tests {
         let mut train = without.train;
         train.sort_unstable();
         assert_eq!(rejoined, train);
+    }
+
+    #[test]
+    fn unseen_dancers_are_tested_on_and_neither_trained_nor_mixed_with_the_test_clips() {
+        let names: Vec<String> = (0..123)
+            .map(|index| format!("{}_{index:03}.bvh", ["Eva", "Evan", "Ida"][index % 3]))
+            .collect();
+        let parts = |split_by: Split| {
+            let config = DataConfig {
+                split: split_by,
+                validation_share: 0.1,
+                ..DataConfig::default()
+            };
+            split(&names, "the data folder", &config)
+        };
+        let dance = parts(Split::Dance).unwrap();
+        let unseen = parts(Split::UnseenDancers(vec!["Eva".into()])).unwrap();
+        assert!(unseen.test.iter().all(|name| name.starts_with("Eva_")));
+        let mut all = [unseen.train.clone(), unseen.validation.clone()].concat();
+        assert!(all.iter().all(|name| !name.starts_with("Eva_")));
+        assert!(!unseen.validation.is_empty());
+        all.extend(unseen.test);
+        all.sort_unstable();
+        let mut training = [dance.train, dance.validation].concat();
+        training.sort_unstable();
+        assert_eq!(all, training);
+        let message = |dancers: &[&str]| {
+            let dancers = dancers.iter().map(|&dancer| dancer.into()).collect();
+            parts(Split::UnseenDancers(dancers))
+                .unwrap_err()
+                .to_string()
+        };
+        let text = message(&["Eva", "Ev"]);
+        assert!(
+            text.contains("show Ev,") && text.contains("the data folder"),
+            "{text}"
+        );
+        for dancers in [&[][..], &["Eva", "Evan", "Ida"]] {
+            assert!(message(dancers).contains("split.unseen_dancers"));
+        }
     }
 
     #[test]

@@ -12,7 +12,8 @@ use super::rows::Row;
 use crate::cli::evaluation_record::{EvaluationRecord, write_json};
 use crate::cli::tables::subject;
 use crate::data::hexadecimal;
-use crate::evaluation::{TableRow, markdown_tables, paper};
+use crate::evaluation::paper::{self, PaperRow};
+use crate::evaluation::{TableRow, markdown_tables};
 use crate::report::{LrpSeries, lrp_curve};
 use crate::training::{RunFolder, replace_file};
 
@@ -135,7 +136,7 @@ fn digests(out: &Path, files: &[PathBuf]) -> anyhow::Result<BTreeMap<String, Str
     files.iter().map(digest).collect()
 }
 
-/// LRP of every model with scores, the mean over its seeds, and of two the paper's.
+/// LRP of every model with scores, the mean over its seeds, and of two the paper's; of the whole model the paper's in any case.
 fn lrp_series(rows: &[TableRow]) -> Vec<LrpSeries> {
     let mut series: Vec<LrpSeries> = Vec::new();
     for row in rows {
@@ -155,14 +156,28 @@ fn lrp_series(rows: &[TableRow]) -> Vec<LrpSeries> {
             let sum: Option<f64> = seeds.iter().map(|seed| seed.lrp.at(length)).sum();
             Some((length as f64, sum? / seeds.len() as f64))
         };
-        let lengths = paper::LENGTHS.iter().map(|&length| length as f64);
         series.push(LrpSeries {
             name: name.into(),
             ours: first.lrp.lengths().filter_map(mean).collect(),
             paper: paper::row(&row.name)
                 .filter(|paper| REFERENCES.contains(&paper.name))
-                .map_or_else(Vec::new, |paper| lengths.zip(paper.lrp).collect()),
+                .map_or_else(Vec::new, papers_lrp),
+        });
+    }
+    if let Some(goal) = paper::row("whole_model")
+        && !series.iter().any(|known| known.name == goal.title)
+    {
+        series.push(LrpSeries {
+            name: goal.title.into(),
+            ours: Vec::new(),
+            paper: papers_lrp(goal),
         });
     }
     series
+}
+
+/// `(N, LRP)` as printed.
+fn papers_lrp(row: &PaperRow) -> Vec<(f64, f64)> {
+    let lengths = paper::LENGTHS.iter().map(|&length| length as f64);
+    lengths.zip(row.lrp).collect()
 }
