@@ -499,7 +499,7 @@ fn the_network_learns_one_window_by_heart() {
         learning_rate: 5e-3,
         ..AdamConfig::default()
     };
-    let mut adam = Adam::new(settings, &built.parameters);
+    let mut adam = Adam::new(settings, &built.parameters, |_| false);
     let mut gradients = [Gradients::zeros(&built.parameters)];
     let mut workspace = Workspace::new();
     let mut position = Vec::new();

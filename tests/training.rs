@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use common::training::{config, dataset, trainer, trainer_of};
 use keydance::autograd::{AutogradError, BlockId, Tape};
+use keydance::models::pan2021::{Controllers, Pan2021Config};
 use keydance::models::weights::SavedWeights;
-use keydance::models::{Batch, Feed, LossTerms, Network};
+use keydance::models::{Batch, Feed, LossTerms, ModelConfig, Network};
 use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
 use keydance::training::state::decode;
 use keydance::training::{
@@ -70,6 +71,42 @@ fn the_learning_rate_rises_then_falls_to_its_final_share() {
     assert!(rates[3..].windows(2).all(|pair| pair[1] < pair[0]));
     let last = rates[rates.len() - 1];
     assert!((0.002..0.0021).contains(&last), "{last}");
+}
+
+#[test]
+fn the_transformer_controllers_learn_at_their_own_rate_and_fully_connected_ones_at_the_others() {
+    let data = dataset();
+    let moved = |controllers| {
+        let mut config = config();
+        config.optimiser.transformer_learning_rate = Some(1e-20);
+        let ModelConfig::Pan2021(model) = ModelConfig::default().small() else {
+            panic!("the default model is not the paper's");
+        };
+        config.model = ModelConfig::Pan2021(Pan2021Config {
+            controllers,
+            ..model
+        });
+        let mut trainer = Trainer::new(config, &data, 1).unwrap();
+        let before = trainer.parameters().clone();
+        train(&mut trainer, None, Some(2));
+        let after = trainer.parameters();
+        let far = |(b, a): (&f32, &f32)| (a - b).abs() > 1e-10;
+        let changed = before
+            .iter()
+            .zip(after.iter())
+            .filter(|((_, b), (_, a))| b.iter().zip(a.iter()).any(far));
+        changed
+            .map(|((name, _), _)| name.to_string())
+            .collect::<Vec<_>>()
+    };
+    let controller =
+        |name: &String| name.starts_with("root_traj") || name.starts_with("velocity_factor_");
+    let transformers = moved(Controllers::Transformer);
+    assert!(!transformers.iter().any(controller), "{transformers:?}");
+    assert!(transformers.len() > 10, "{transformers:?}");
+    let connected = moved(Controllers::FullyConnected);
+    let moving = connected.iter().filter(|name| controller(name)).count();
+    assert!(moving >= 8, "{connected:?}");
 }
 
 #[test]

@@ -103,10 +103,13 @@ pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
 
 fn learning_rate(optimiser: &AdamConfig) -> String {
     let rate = optimiser.learning_rate;
-    let Some(schedule) = optimiser.rate_schedule else {
-        return format!("learning rate {rate}");
-    };
     let mut text = format!("learning rate {rate}");
+    if let Some(rate) = optimiser.transformer_learning_rate {
+        text += &format!(" ({rate} for Transformers)");
+    }
+    let Some(schedule) = optimiser.rate_schedule else {
+        return text;
+    };
     if schedule.warmup_steps > 0 {
         text += &format!(" after {} steps of warm-up", schedule.warmup_steps);
     }

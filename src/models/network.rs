@@ -98,6 +98,11 @@ pub trait Network<T: Real>: Send + Sync {
         0
     }
 
+    /// Whether the parameter of this name is a Transformer's, see [`crate::optim::AdamConfig::transformer_learning_rate`].
+    fn in_transformer(&self, _parameter: &str) -> bool {
+        false
+    }
+
     /// What it is fed at a step for which scheduled sampling drew `drawn`.
     fn feed(&self, drawn: Feed) -> Feed {
         drawn

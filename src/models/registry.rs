@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::harvey2020::{Harvey2020, Harvey2020Config};
 use super::interpolation::Interpolation;
 use super::linear_positions::LinearPositions;
-use super::pan2021::{Pan2021, Pan2021Config};
+use super::pan2021::{Controllers, Pan2021, Pan2021Config};
 use super::zero_velocity::ZeroVelocity;
 use super::{ModelError, Network, TransitionModel};
 use crate::autograd::Real;
@@ -68,6 +68,14 @@ impl ModelConfig {
         match self {
             Self::Pan2021(config) => config.root_frame,
             _ => RootFrame::World,
+        }
+    }
+
+    /// Whether some of its weights are [`Network::in_transformer`].
+    pub fn has_transformers(&self) -> bool {
+        match self {
+            Self::Pan2021(config) => config.controllers == Controllers::Transformer,
+            _ => false,
         }
     }
 

@@ -25,6 +25,9 @@ const CHUNK: usize = 1 << 14;
 pub struct AdamConfig {
     /// The rate, or where it has a schedule the highest.
     pub learning_rate: f64,
+    /// The same for the weights of Transformers, which a large rate switches off (docs/model.md). Left out: `learning_rate`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transformer_learning_rate: Option<f64>,
     /// Decay of the mean of gradients.
     pub beta1: f64,
     /// Decay of the mean of squared gradients.
@@ -47,12 +50,19 @@ impl AdamConfig {
             Some(schedule) => self.learning_rate * schedule.share(step, steps),
         }
     }
+
+    /// The rate of the weights of Transformers over that of the others, the same at every step.
+    fn transformer_share(&self) -> f64 {
+        self.transformer_learning_rate
+            .map_or(1.0, |rate| rate / self.learning_rate)
+    }
 }
 
 impl Default for AdamConfig {
     fn default() -> Self {
         Self {
             learning_rate: 1e-4,
+            transformer_learning_rate: None,
             beta1: 0.9,
             beta2: 0.999,
             epsilon: 1e-8,
@@ -75,12 +85,14 @@ pub struct NonFiniteGradient {
 pub struct Adam<T> {
     config: AdamConfig,
     steps: u64,
+    /// The rate of each parameter over the learning rate.
+    shares: Vec<f64>,
     /// m and v of each parameter, in its layout.
     first: Vec<Vec<T>>,
     second: Vec<Vec<T>>,
 }
 
-/// What is the same for all weights of a step.
+/// What is the same for all weights of a parameter in a step.
 #[derive(Clone, Copy)]
 struct Factors<T> {
     gradient: T,
@@ -93,17 +105,27 @@ struct Factors<T> {
 }
 
 impl<T: Real> Adam<T> {
-    /// Moments of zero for every parameter.
-    pub fn new(config: AdamConfig, parameters: &Parameters<T>) -> Self {
+    /// Moments of zero for every parameter. `in_transformer` says of a parameter's name whether it is a Transformer's, see
+    /// [`AdamConfig::transformer_learning_rate`].
+    pub fn new(
+        config: AdamConfig,
+        parameters: &Parameters<T>,
+        in_transformer: impl Fn(&str) -> bool,
+    ) -> Self {
         let zeros = || -> Vec<Vec<T>> {
             parameters
                 .iter()
                 .map(|(_, value)| vec![T::zero(); value.len()])
                 .collect()
         };
+        let share = |name: &str| match in_transformer(name) {
+            true => config.transformer_share(),
+            false => 1.0,
+        };
         Self {
             config,
             steps: 0,
+            shares: parameters.iter().map(|(name, _)| share(name)).collect(),
             first: zeros(),
             second: zeros(),
         }
@@ -154,12 +176,17 @@ impl<T: Real> Adam<T> {
         };
         let norm = total_norm(parameters, add(sum, rest))?;
         self.steps += 1;
-        let factors = self.factors(norm, learning_rate);
+        let factors: Vec<_> = self
+            .shares
+            .iter()
+            .map(|share| self.factors(norm, learning_rate * share))
+            .collect();
         let chunks: Vec<_> = parameters
             .values_mut()
             .zip(sum.iter_mut())
             .zip(self.first.iter_mut().zip(&mut self.second))
-            .flat_map(|(((_, w), g), (m, v))| {
+            .zip(factors)
+            .flat_map(|((((_, w), g), (m, v)), factors)| {
                 let w = w.as_slice_mut().expect("a parameter is in standard layout");
                 assert!(
                     w.len() == g.len() && w.len() == m.len(),
@@ -168,11 +195,12 @@ impl<T: Real> Adam<T> {
                 w.chunks_mut(CHUNK)
                     .zip(g.chunks_mut(CHUNK))
                     .zip(m.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)))
+                    .map(move |chunk| (factors, chunk))
             })
             .collect();
         chunks
             .into_par_iter()
-            .for_each(|((w, g), (m, v))| update(factors, w, g, m, v));
+            .for_each(|(factors, ((w, g), (m, v)))| update(factors, w, g, m, v));
         Ok(norm)
     }
 
@@ -353,7 +381,7 @@ mod tests {
             ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6)
         };
         let mut parameters = parameters::<f64>(&[&start]);
-        let mut adam = Adam::new(config, &parameters);
+        let mut adam = Adam::new(config, &parameters, |_| false);
         for t in 0..20 {
             // Two shards that add up to the gradient.
             let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
@@ -380,7 +408,7 @@ mod tests {
     fn a_constant_gradient_moves_a_weight_by_the_learning_rate_a_step() {
         // With g constant both corrected moments are exact: every step is rate * g / (|g| + eps).
         let mut parameters = parameters::<f32>(&[&[1.0, 2.0, 3.0]]);
-        let mut adam = Adam::new(AdamConfig::default(), &parameters);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| false);
         for _ in 0..5 {
             let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
             adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
@@ -388,6 +416,34 @@ mod tests {
         let expected = [1.0 - 5e-4, 2.0 + 5e-4, 3.0 - 2.5e-4];
         for (w, expected) in weights(&parameters).into_iter().zip(expected) {
             assert!((w - expected).abs() < 1e-6, "{w} is not {expected}");
+        }
+    }
+
+    #[test]
+    fn the_weights_of_transformers_have_their_own_rate() {
+        let config = AdamConfig {
+            learning_rate: 1e-3,
+            transformer_learning_rate: Some(2e-4),
+            ..AdamConfig::default()
+        };
+        let start = [1.0, -2.0];
+        let mut both = parameters::<f64>(&[&start, &start]);
+        let mut adam = Adam::new(config, &both, |name| name == "p1");
+        // Half the rate of the config, as a schedule has it.
+        for t in 0..5 {
+            let gradients = gradients(&both, |_, i| (i + t) as f64 - 1.5);
+            adam.step(&mut both, &mut [gradients], 5e-4).unwrap();
+        }
+        for (k, rate) in [5e-4, 1e-4].into_iter().enumerate() {
+            let mut alone = parameters::<f64>(&[&start]);
+            let mut adam = Adam::new(config, &alone, |_| false);
+            for t in 0..5 {
+                let gradients = gradients(&alone, |_, i| (i + t) as f64 - 1.5);
+                adam.step(&mut alone, &mut [gradients], rate).unwrap();
+            }
+            for (w, expected) in weights(&both)[2 * k..].iter().zip(weights(&alone)) {
+                assert!((w - expected).abs() < 1e-12, "p{k}: {w} is not {expected}");
+            }
         }
     }
 
@@ -404,7 +460,7 @@ mod tests {
         };
         let run = |config, scale: f64| {
             let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
-            let mut adam = Adam::new(config, &parameters);
+            let mut adam = Adam::new(config, &parameters, |_| false);
             let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
             let norm = adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
             (norm, weights(&parameters))
@@ -422,7 +478,7 @@ mod tests {
     #[test]
     fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
         let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
-        let mut adam = Adam::new(AdamConfig::default(), &parameters);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| false);
         let before = (weights(&parameters), adam.clone());
         for bad in [f64::NAN, f64::INFINITY] {
             let gradients = gradients(
@@ -452,6 +508,7 @@ mod tests {
                     ..AdamConfig::default()
                 },
                 &parameters,
+                |_| false,
             );
             for t in 0..3 {
                 let mut shards: Vec<_> = (0..4)

@@ -237,6 +237,9 @@ impl ExperimentConfig {
         let is_beta = |x: f64| (0.0..1.0).contains(&x);
         let beta = || "at least 0 and below 1".to_string();
         positive("optimiser.learning_rate", adam.learning_rate)?;
+        if let Some(rate) = adam.transformer_learning_rate {
+            positive("optimiser.transformer_learning_rate", rate)?;
+        }
         check("optimiser.beta1", adam.beta1, is_beta(adam.beta1), beta)?;
         check("optimiser.beta2", adam.beta2, is_beta(adam.beta2), beta)?;
         positive("optimiser.epsilon", adam.epsilon)?;

@@ -265,6 +265,10 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
         origin: last.into(),
         cause,
     })?;
+    // A budget is over any model; what it says of a part that this one lacks makes no other experiment of it.
+    if !config.model.has_transformers() {
+        config.optimiser.transformer_learning_rate = None;
+    }
     Ok(config)
 }
 
@@ -375,6 +379,26 @@ mod tests {
             (schedule.max_len, schedule.fraction, schedule.batch_size),
             (9, 0.5, 32)
         );
+    }
+
+    #[test]
+    fn what_a_budget_says_of_transformers_is_left_out_for_a_model_without_them() {
+        let rate = "optimiser.transformer_learning_rate=2e-4";
+        let of = |model: &str, sets: &[&str]| load(&[("a.toml", model)], sets).unwrap();
+        let whole = of("", &[rate]).optimiser;
+        assert_eq!(whole.transformer_learning_rate, Some(2e-4));
+        for model in [
+            "model.controllers = 'fully_connected'",
+            "model.kind = 'harvey2020'",
+        ] {
+            assert_eq!(of(model, &[rate]), of(model, &[]));
+        }
+        let text = load(
+            &[("a.toml", "")],
+            &["optimiser.transformer_learning_rate=0"],
+        );
+        let text = text.unwrap_err();
+        assert!(text.contains("= 0: expected a number above 0"), "{text}");
     }
 
     #[test]

@@ -68,8 +68,10 @@ impl MeasuredStep {
             single_frames::draw(&[clip.nrows()], count, &mut streams.single_frames(0));
         Ok(Self {
             streams,
+            adam: Adam::new(config.optimiser, &parameters, |name| {
+                network.in_transformer(name)
+            }),
             network,
-            adam: Adam::new(config.optimiser, &parameters),
             stepper: Stepper::new(&parameters, config.schedule.shards, threads)?,
             parameters,
             standardisation,

@@ -131,7 +131,7 @@ impl<'d> Trainer<'d> {
         }
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
-        let network = build(&mut init, &standardisation)?.into();
+        let network: Arc<dyn Network<f32>> = build(&mut init, &standardisation)?.into();
         Ok(Self {
             config_digest: checkpoint::file_digest(config_toml.as_bytes()),
             config_toml,
@@ -142,8 +142,10 @@ impl<'d> Trainer<'d> {
             },
             streams,
             schedule,
+            adam: Adam::new(config.optimiser, &parameters, |name| {
+                network.in_transformer(name)
+            }),
             network,
-            adam: Adam::new(config.optimiser, &parameters),
             stepper: Stepper::new(&parameters, config.schedule.shards, threads)?,
             parameters,
             threads,

@@ -3,7 +3,7 @@
 use ndarray::Array3;
 use rand::Rng;
 
-use super::config::{Output, Pan2021Config};
+use super::config::{Controllers, Output, Pan2021Config};
 use super::control_path::ControlPath;
 use super::controller::{Controller, Session, Trajectory};
 use super::given::Given;
@@ -26,6 +26,9 @@ const KEYFRAME: std::ops::Range<usize> = 0..FACING.end;
 const DECODED_STATE: usize = 69 + 4 + 69;
 /// What the root decoder gives: p^r, o^r, v^r.
 const DECODED_ROOT: usize = 3 + 1 + 3;
+/// What the names of the controllers' weights begin with.
+const ROOT_TRAJECTORY_CONTROLLER: &str = "root_trajectory_controller";
+const VELOCITY_FACTOR_CONTROLLER: &str = "velocity_factor_controller";
 
 /// The network of Pan et al. 2021 and its ablations.
 #[derive(Debug, Clone)]
@@ -103,10 +106,10 @@ impl Pan2021 {
             LastLayer::Activated,
         );
         let root_trajectory_controller =
-            Controller::new(init, "root_trajectory_controller", 3, config);
+            Controller::new(init, ROOT_TRAJECTORY_CONTROLLER, 3, config);
         let velocity_factor_controller = config.velocity_factor.then(|| {
             let channels = VELOCITY_FACTORS.len();
-            Controller::new(init, "velocity_factor_controller", channels, config)
+            Controller::new(init, VELOCITY_FACTOR_CONTROLLER, channels, config)
         });
         let control_path = config.control_path.then(|| ControlPath::new(init, config));
         let lstm = match config.lstms {
@@ -431,6 +434,12 @@ impl<T: Real> Network<T> for Pan2021 {
             Some(_) => self.config.single_frames,
             None => 0,
         }
+    }
+
+    fn in_transformer(&self, parameter: &str) -> bool {
+        let (part, _) = parameter.split_once('.').unwrap_or((parameter, ""));
+        self.config.controllers == Controllers::Transformer
+            && [ROOT_TRAJECTORY_CONTROLLER, VELOCITY_FACTOR_CONTROLLER].contains(&part)
     }
 
     fn losses(
