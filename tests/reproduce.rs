@@ -22,6 +22,7 @@ const SMALL: &str =
     "hidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n";
 const BUDGET: &str = "[data]\nsplit = { share = 0.8 }\nvalidation_share = 0.25\n\
     [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n\
+    [optimiser]\ntransformer_learning_rate = 5e-5\n\
     [checkpoint]\nevery_steps = 3\n[validation]\nevery_steps = 5\nwindows = 2\nlengths = [10, 50]\n";
 
 /// Data and configs.
@@ -130,7 +131,7 @@ fn every_config_becomes_a_row_with_scores_curves_and_a_manifest_of_all() {
     for words in [
         "One LSTM (seed 1), Whole model (seed 1): ",
         &format!("({:.3} % of the whole", 100.0 * done as f64 / whole as f64),
-        "schedule.fraction 0.05, batch size 8, learning rate 0.0001",
+        "schedule.fraction 0.05, batch size 8, learning rate 0.0001 (0.00005 for Transformers)",
         manifest["data_digest"].as_str().unwrap(),
     ] {
         assert!(tables.contains(words), "{words}: {tables}");

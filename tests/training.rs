@@ -91,22 +91,20 @@ fn the_transformer_controllers_learn_at_their_own_rate_and_fully_connected_ones_
         train(&mut trainer, None, Some(2));
         let after = trainer.parameters();
         let far = |(b, a): (&f32, &f32)| (a - b).abs() > 1e-10;
-        let changed = before
+        before
             .iter()
             .zip(after.iter())
-            .filter(|((_, b), (_, a))| b.iter().zip(a.iter()).any(far));
-        changed
-            .map(|((name, _), _)| name.to_string())
+            .map(|((name, b), (_, a))| (name.to_string(), b.iter().zip(a.iter()).any(far)))
             .collect::<Vec<_>>()
     };
     let controller =
-        |name: &String| name.starts_with("root_traj") || name.starts_with("velocity_factor_");
-    let transformers = moved(Controllers::Transformer);
-    assert!(!transformers.iter().any(controller), "{transformers:?}");
-    assert!(transformers.len() > 10, "{transformers:?}");
-    let connected = moved(Controllers::FullyConnected);
-    let moving = connected.iter().filter(|name| controller(name)).count();
-    assert!(moving >= 8, "{connected:?}");
+        |name: &str| name.starts_with("root_traj") || name.starts_with("velocity_factor_");
+    for (name, moved) in moved(Controllers::Transformer) {
+        assert_eq!(moved, !controller(&name), "{name}");
+    }
+    for (name, moved) in moved(Controllers::FullyConnected) {
+        assert!(moved, "{name}");
+    }
 }
 
 #[test]
