@@ -390,10 +390,14 @@ fn the_gradient_with_a_control_path_is_that_of_central_differences() {
 }
 
 /// The ablations and options that change the network.
-fn networks() -> [Pan2021Config; 8] {
+fn networks() -> [Pan2021Config; 9] {
     [
         residual(),
         with_control_path(),
+        Pan2021Config {
+            control_path_members: 2,
+            ..with_control_path()
+        },
         Pan2021Config {
             velocity_factor: false,
             ..with_control_path()
@@ -666,7 +670,7 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         let built = model.build(&mut init, &Standardisation::fit([]));
         built.err().unwrap().to_string()
     };
-    let cases: [(Change, &str); 12] = [
+    let cases: [(Change, &str); 13] = [
         (
             |config| config.lstms = 3,
             "model.lstms = 3: expected 1 or 2",
@@ -694,6 +698,10 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         (
             |config| config.control_path = true,
             "expected model.output = \"residual\"",
+        ),
+        (
+            |config| config.control_path_members = 0,
+            "model.control_path_members = 0: expected 1 to 64",
         ),
         (
             |config| config.dropout = 1.0,

@@ -3,6 +3,8 @@
 #[path = "common/network.rs"]
 mod network;
 
+use std::collections::BTreeMap;
+
 use keydance::autograd::{Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, RootFrame, window_features};
@@ -14,7 +16,7 @@ use keydance::models::{
     TransitionRequest,
 };
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
-use ndarray::{Array2, ArrayView1, Axis, s};
+use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
 use network::{Built, build, predict, residual, with_control_path};
 
 /// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least expected square error, where numbers d
@@ -363,6 +365,68 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
         let named = format!("frame {frame} of a window");
         assert!(error.contains(&named), "{error}");
     }
+}
+
+#[test]
+fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_its_own_distance() {
+    let member = with_control_path().small();
+    let ensemble = Pan2021Config {
+        control_path_members: 3,
+        ..member.clone()
+    };
+    let (features, statistics) = generated_windows(9, 2, 13).unwrap();
+    let mut together: Built<f64> = build(&ensemble, &statistics).disturbed();
+    for (name, value) in together.parameters.values_mut() {
+        // The paths alone: whatever the decoders would add is 0.
+        if name.starts_with("state_decoder.4") || name.starts_with("root_decoder.4") {
+            value.fill(0.0);
+        }
+    }
+    let single_frames = || {
+        [(30, 12), (7, 7)].map(|(n, frame)| SingleFrame {
+            window: generated_windows(n, 1, n as u64).unwrap().0,
+            frame,
+        })
+    };
+    let loss = |built: &Built<f64>| {
+        let batch = Batch {
+            single_frames: single_frames().into(),
+            total_single_frames: 2,
+            ..Batch::of(features.clone())
+        };
+        let mut workspace = Workspace::new();
+        let mut tape = Tape::recording(&built.parameters, &mut workspace);
+        let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+        let terms = losses.unwrap().terms;
+        let term = terms.iter().find(|(name, _)| *name == "single_frames");
+        tape.values(term.unwrap().1)[0]
+    };
+    let weights: BTreeMap<String, ArrayD<f64>> = together
+        .parameters
+        .values_mut()
+        .map(|(name, value)| (name.to_owned(), value.clone()))
+        .collect();
+    let mut alone = Vec::new();
+    for path in ["control_path.", "control_path_2.", "control_path_3."] {
+        let mut built: Built<f64> = build(&member, &statistics);
+        for (name, value) in built.parameters.values_mut() {
+            value.assign(&weights[&name.replace("control_path.", path)]);
+        }
+        alone.push((predict(&built, &features), loss(&built)));
+    }
+    let mean = (&alone[0].0 + &alone[1].0 + &alone[2].0) / 3.0;
+    let frames = predict(&together, &features);
+    let furthest = (&frames - &mean)
+        .iter()
+        .fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(furthest < 1e-12, "{furthest}");
+    assert!((&alone[0].0 - &alone[1].0).iter().any(|x| x.abs() > 0.01));
+    let expected = alone.iter().map(|(_, loss)| loss).sum::<f64>() / 3.0;
+    let found = loss(&together);
+    assert!(
+        (found - expected).abs() < 1e-9 * found,
+        "{found} {expected}"
+    );
 }
 
 #[test]

@@ -75,6 +75,8 @@ pub struct Pan2021Config {
     pub output: Output,
     /// A feed-forward path from the controls around each frame to what is added to its estimate; not in the paper.
     pub control_path: bool,
+    /// Control paths whose mean is taken: an ensemble.
+    pub control_path_members: usize,
     /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
     pub single_frames: usize,
     /// First hidden layer of encoders and decoders.
@@ -102,6 +104,7 @@ impl Default for Pan2021Config {
             root_frame: RootFrame::World,
             output: Output::Absolute,
             control_path: false,
+            control_path_members: 1,
             single_frames: 512,
             hidden: 512,
             code: 256,
@@ -154,6 +157,7 @@ impl Pan2021Config {
             }
         }
         for (key, value, most) in [
+            ("control_path_members", self.control_path_members, 64),
             ("hidden", self.hidden, 65_536),
             ("code", self.code, 4096),
             ("heads", self.heads, 256),

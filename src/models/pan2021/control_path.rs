@@ -25,11 +25,35 @@ const DROPOUT: f64 = 0.2;
 /// keyframes' o^r there, x and z, in deviations of v^r; the height of the root and, where the network has them, the five velocity factors at each,
 /// standardised; the turn from k1 to k2, rad a frame times 30; the estimate, p^b of k1 and of k2, these two times their likeness to
 /// frame t. All that twice, the second time multiplied with what the estimate leaves open in frame t, as the correction is itself.
+///
+/// With more than one member it is an ensemble: the correction is the mean of its members', which differ in their initial weights and in what
+/// dropout takes from them.
 #[derive(Debug, Clone)]
 pub(super) struct ControlPath {
+    first: Member,
+    others: Vec<Member>,
+    velocity_factor: bool,
+}
+
+#[derive(Debug, Clone)]
+struct Member {
     hidden: Mlp,
     last: Linear,
-    velocity_factor: bool,
+}
+
+impl Member {
+    fn new<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        seen: usize,
+        hidden: usize,
+    ) -> Self {
+        let (sizes, last) = ([seen, hidden, hidden], format!("{name}.4"));
+        Self {
+            hidden: Mlp::new(init, name, &sizes, LastLayer::Activated),
+            last: Linear::of_zeros(init, &last, hidden, BODY_POSITIONS.len()),
+        }
+    }
 }
 
 /// Frames as the path sees them, in rows.
@@ -71,10 +95,12 @@ impl<'f, T: Real> Place<'f, T> {
 impl ControlPath {
     pub fn new<T: Real, R: Rng>(init: &mut Initialiser<'_, T, R>, config: &Pan2021Config) -> Self {
         let (seen, hidden) = (2 * seen(config.velocity_factor), config.hidden);
-        let sizes = [seen, hidden, hidden];
+        let first = Member::new(init, "control_path", seen, hidden);
+        let others = (2..=config.control_path_members)
+            .map(|member| Member::new(init, &format!("control_path_{member}"), seen, hidden));
         Self {
-            hidden: Mlp::new(init, "control_path", &sizes, LastLayer::Activated),
-            last: Linear::of_zeros(init, "control_path.4", hidden, BODY_POSITIONS.len()),
+            first,
+            others: others.collect(),
             velocity_factor: config.velocity_factor,
         }
     }
@@ -101,13 +127,15 @@ impl ControlPath {
             })
             .collect();
         let seen = self.seen(tape, units, &places);
-        let hidden = self.hidden.forward(tape, seen.input)?;
-        let corrections = self.last.forward(tape, hidden)?;
+        let corrections = self.mean_of_members(tape, |tape, member| {
+            let hidden = member.hidden.forward(tape, seen.input)?;
+            member.last.forward(tape, hidden)
+        })?;
         tape.mul(corrections, seen.open)
     }
 
-    /// The distance of p^b with the corrections from the true one, in s_p, the mean over the batch's single frames: `[1]`. What LRP
-    /// measures.
+    /// The distance of p^b with a member's corrections from the true one, in s_p, the mean over the batch's single frames and the members:
+    /// `[1]`. What LRP measures, of each member by itself: trained on the distance of their mean they would become parts of one network.
     ///
     /// # Errors
     /// Windows of another shape than they are to have, or a frame beyond its window.
@@ -150,16 +178,31 @@ impl ControlPath {
             }
         });
         let seen = self.seen(tape, units, &places);
-        let hidden = self.hidden.forward(tape, seen.input)?;
-        let hidden = tape.dropout(hidden, DROPOUT);
-        let corrections = self.last.forward(tape, hidden)?;
-        let corrections = tape.mul(corrections, seen.open)?;
-        let error = tape.sub(missed, corrections)?;
-        let error = units.in_scale(tape, error)?;
-        let distances = tape.vector_norm(error, NORM_EPS)?;
-        let sum = tape.sum(distances);
+        let sum = self.mean_of_members(tape, |tape, member| {
+            let hidden = member.hidden.forward(tape, seen.input)?;
+            let hidden = tape.dropout(hidden, DROPOUT);
+            let corrections = member.last.forward(tape, hidden)?;
+            let corrections = tape.mul(corrections, seen.open)?;
+            let error = tape.sub(missed, corrections)?;
+            let error = units.in_scale(tape, error)?;
+            let distances = tape.vector_norm(error, NORM_EPS)?;
+            Ok(tape.sum(distances))
+        })?;
         let mean = 1.0 / batch.total_single_frames.max(1) as f64;
         Ok(tape.affine(sum, mean, 0.0))
+    }
+
+    fn mean_of_members<'p, T: Real>(
+        &self,
+        tape: &mut Tape<'p, T>,
+        of: impl Fn(&mut Tape<'p, T>, &Member) -> Result<Var, AutogradError>,
+    ) -> Result<Var, AutogradError> {
+        let mut sum = of(tape, &self.first)?;
+        for member in &self.others {
+            let next = of(tape, member)?;
+            sum = tape.add(sum, next)?;
+        }
+        Ok(tape.affine(sum, 1.0 / (1 + self.others.len()) as f64, 0.0))
     }
 
     fn seen<T: Real>(
