@@ -670,7 +670,7 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         let built = model.build(&mut init, &Standardisation::fit([]));
         built.err().unwrap().to_string()
     };
-    let cases: [(Change, &str); 13] = [
+    let cases: [(Change, &str); 14] = [
         (
             |config| config.lstms = 3,
             "model.lstms = 3: expected 1 or 2",
@@ -702,6 +702,10 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         (
             |config| config.control_path_members = 0,
             "model.control_path_members = 0: expected 1 to 64",
+        ),
+        (
+            |config| (config.velocity_refinement, config.velocity_factor) = (true, false),
+            "expected model.velocity_factor = true",
         ),
         (
             |config| config.dropout = 1.0,

@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 
 use keydance::autograd::{Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, RootFrame, window_features};
+use keydance::data::{DanceClip, DataConfig, RootFrame, Standardisation, window_features};
 use keydance::evaluation::window_request;
 use keydance::models::gradient_check::generated_windows;
 use keydance::models::pan2021::Pan2021Config;
+use keydance::models::velocity_refinement::refine;
 use keydance::models::{
     Batch, Feed, ModelConfig, Network, SingleFrame, TrainedModel, Transition, TransitionModel,
     TransitionRequest,
@@ -133,19 +134,39 @@ fn turned(request: &TransitionRequest, angle: f64) -> TransitionRequest {
     turned
 }
 
-#[test]
-fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction_is_the_same_dance()
-{
+/// Two generated clips.
+fn clips() -> Vec<DanceClip> {
     let generated = generate(&ChoreographyConfig {
         clips: 2,
         frames_per_clip: 120,
         seed: 4,
     });
-    let clips: Vec<DanceClip> = generated
+    generated
         .unwrap()
         .into_iter()
         .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()).unwrap())
-        .collect();
+        .collect()
+}
+
+/// A network as the model of transitions that synthesis and evaluation know.
+fn trained(
+    config: Pan2021Config,
+    built: Built<f32>,
+    standardisation: &Standardisation,
+) -> TrainedModel {
+    TrainedModel::new(
+        "small".into(),
+        Box::new(built.network) as Box<dyn Network<f32>>,
+        built.parameters,
+        standardisation.clone(),
+        ModelConfig::Pan2021(config).root_frame(),
+    )
+}
+
+#[test]
+fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction_is_the_same_dance()
+{
+    let clips = clips();
     let (clip, start, length) = (&clips[0], 30, 20);
     let window = window_features(&clip.features, start, length);
     let request = window_request(&clip.clip, start, window.view()).unwrap();
@@ -164,13 +185,7 @@ fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction
             ..with_control_path().small()
         };
         let built: Built<f32> = build(&config, &standardisation).disturbed();
-        let model = TrainedModel::new(
-            "small".into(),
-            Box::new(built.network) as Box<dyn Network<f32>>,
-            built.parameters,
-            standardisation,
-            ModelConfig::Pan2021(config).root_frame(),
-        );
+        let model = trained(config, built, &standardisation);
         let requests = [
             request.clone(),
             moved(&request, shift),
@@ -442,4 +457,30 @@ fn the_control_path_sees_controls_twenty_frames_ahead_that_the_controllers_do_no
     };
     assert_eq!(first_changed(&with_control_path()), 30 - 20);
     assert!((30 - 4..30).contains(&first_changed(&residual())));
+}
+
+#[test]
+fn a_trained_model_refines_its_transitions_where_its_config_says_so() {
+    let clip = &clips()[0];
+    let window = window_features(&clip.features, 30, 20);
+    let request = window_request(&clip.clip, 30, window.view()).unwrap();
+    let standardisation = RootFrame::World.standardisation([clip.features.view()], 20);
+    let [plain, refined] = [false, true].map(|velocity_refinement| {
+        let config = Pan2021Config {
+            velocity_refinement,
+            ..with_control_path().small()
+        };
+        let built: Built<f32> = build(&config, &standardisation).disturbed();
+        let model = trained(config, built, &standardisation);
+        let [transition] = model
+            .transitions(std::slice::from_ref(&request))
+            .unwrap()
+            .try_into()
+            .unwrap();
+        transition.frames
+    });
+    let mut expected = plain.clone();
+    refine(&request, expected.view_mut());
+    assert_eq!(refined, expected);
+    assert_ne!(refined, plain);
 }

@@ -15,6 +15,7 @@ mod posed_frames;
 pub mod registry;
 pub mod trained;
 pub mod transition;
+pub mod velocity_refinement;
 pub mod weights;
 pub mod zero_velocity;
 

@@ -6,6 +6,7 @@ use ndarray::{Array2, Array3, s};
 
 use super::{
     Batch, ModelError, Network, PoseWindows, Transition, TransitionModel, TransitionRequest,
+    velocity_refinement,
 };
 use crate::autograd::{Parameters, Tape, Workspace};
 use crate::data::root_frame::WindowFrame;
@@ -135,6 +136,9 @@ impl TrainedModel {
                 .rows_mut()
                 .into_iter()
                 .for_each(|row| frame.leave(row));
+            if self.network.refines_velocities() {
+                velocity_refinement::refine(request, frames.view_mut());
+            }
             let transition = Transition { frames };
             transition.check(length)?;
             transitions.push(transition);

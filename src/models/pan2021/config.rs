@@ -79,6 +79,9 @@ pub struct Pan2021Config {
     pub control_path_members: usize,
     /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
     pub single_frames: usize,
+    /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper, see
+    /// [`crate::models::velocity_refinement`].
+    pub velocity_refinement: bool,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,
     /// Codes, LSTM states, Transformer tokens, second hidden layer of the decoders.
@@ -106,6 +109,7 @@ impl Default for Pan2021Config {
             control_path: false,
             control_path_members: 1,
             single_frames: 512,
+            velocity_refinement: false,
             hidden: 512,
             code: 256,
             window: 7,
@@ -186,6 +190,11 @@ impl Pan2021Config {
             return complain(
                 "model.control_path = true corrects an estimate: expected model.output = \"residual\""
                     .into(),
+            );
+        }
+        if self.velocity_refinement && !self.velocity_factor {
+            return complain(
+                "model.velocity_refinement = true asks for velocity factors: expected model.velocity_factor = true".into(),
             );
         }
         if self.window.is_multiple_of(2) || self.window > 1001 {
