@@ -4,7 +4,7 @@ use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, window_features};
 use keydance::evaluation::window_request;
 use keydance::models::TransitionRequest;
-use keydance::models::velocity_refinement::refine;
+use keydance::models::velocity_refinement;
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
@@ -42,6 +42,12 @@ fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
             frame[number] = middle + rng.random_range(-1.0..1.0);
         }
     }
+    frames
+}
+
+fn refined(request: &TransitionRequest, predicted: &Array2<f64>) -> Array2<f64> {
+    let mut frames = predicted.clone();
+    velocity_refinement::refine(request, frames.view_mut());
     frames
 }
 
@@ -84,8 +90,7 @@ fn distance(window: ArrayView2<f64>, frames: &Array2<f64>) -> f64 {
 fn a_slow_and_trembling_motion_becomes_as_fast_as_asked_and_smooth_and_no_further_from_the_truth() {
     let (window, request) = transition(&clip(), 60);
     let predicted = slow_and_trembling(window.view());
-    let mut refined = predicted.clone();
-    refine(&request, refined.view_mut());
+    let refined = refined(&request, &predicted);
     let before_and_after = |measure: fn(ArrayView2<f64>, &Array2<f64>) -> f64| {
         [&predicted, &refined].map(|frames| measure(window.view(), frames))
     };
@@ -101,8 +106,7 @@ fn a_slow_and_trembling_motion_becomes_as_fast_as_asked_and_smooth_and_no_furthe
 fn only_bodies_between_the_keyframes_change_and_velocities_are_their_steps() {
     let (window, request) = transition(&clip(), 60);
     let predicted = slow_and_trembling(window.view());
-    let mut refined = predicted.clone();
-    refine(&request, refined.view_mut());
+    let refined = refined(&request, &predicted);
     let between = BODY_POSITIONS.end..BODY_VELOCITIES.start;
     for columns in [between, BODY_VELOCITIES.end..FRAME] {
         assert_eq!(
@@ -136,8 +140,7 @@ fn a_straight_motion_that_is_as_fast_as_asked_stays_as_it_is() {
     request.velocity_factors.assign(&factors);
     let root = window.slice(s![.., ROOT_POSITION]);
     request.root_trajectory.assign(&root);
-    let mut refined = predicted.clone();
-    refine(&request, refined.view_mut());
+    let refined = refined(&request, &predicted);
     for number in BODY_POSITIONS {
         for t in 0..20 {
             let moved = refined[[t, number]] - predicted[[t, number]];
@@ -244,8 +247,7 @@ fn the_result_is_the_documented_minimum_at_every_length() {
         let (window, request) = transition(&clip, length);
         let predicted = slow_and_trembling(window.view());
         let expected = expected(&request, &predicted);
-        let mut refined = predicted.clone();
-        refine(&request, refined.view_mut());
+        let refined = refined(&request, &predicted);
         for ((t, number), expected) in expected.indexed_iter() {
             let found = refined[[t, number]];
             assert!(
@@ -262,13 +264,13 @@ fn a_part_that_is_asked_to_stand_still_or_does_not_move_gives_finite_frames() {
     let predicted = slow_and_trembling(window.view());
     for (factor, still) in [(0.0, false), (1e6, false), (2.0, true)] {
         request.velocity_factors.fill(factor);
-        let mut refined = predicted.clone();
+        let mut predicted = predicted.clone();
         if still {
-            for mut frame in refined.rows_mut() {
+            for mut frame in predicted.rows_mut() {
                 frame.assign(&window.slice(s![0, ..FRAME]));
             }
         }
-        refine(&request, refined.view_mut());
+        let refined = refined(&request, &predicted);
         assert!(refined.iter().all(|x| x.is_finite()), "{factor} {still}");
     }
 }

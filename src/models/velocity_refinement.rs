@@ -9,8 +9,9 @@
 //! ```
 //!
 //! where w_t are the velocities that a motion has, each joint's times the ratio of the velocity factor (eq. 1) asked for to the one its part of
-//! the body has in that frame. Ten times, beginning with p itself, w is taken from the last x and x is the minimum: a linear system with two diagonals beside
-//! the main one, the same for all 69 numbers. Bone lengths are not held, and short ones can become much longer. (This is how projective dynamics meets its constraints, Bouaziz et al., ACM TOG 33(4), 2014.)
+//! the body has in that frame. Ten times, beginning with p itself, w is taken from the last x and x is the minimum: a linear system with two
+//! diagonals beside the main one, the same for all 69 numbers. (This is how projective dynamics meets its constraints, Bouaziz et al., ACM TOG
+//! 33(4), 2014.) Bone lengths are not held, and short ones can become much longer.
 
 use ndarray::{ArrayView1, ArrayViewMut2};
 
