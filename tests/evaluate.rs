@@ -455,6 +455,31 @@ fn lengths_of_ones_own_are_scored_each_once() {
 }
 
 #[test]
+fn a_run_is_scored_with_its_predictions_refined_too_and_keeps_only_the_scores_of_its_own_model() {
+    let run = copied_run();
+    let scored = |refined: bool| {
+        let file = run.path().join(format!("{refined}.json"));
+        let option = format!("model.velocity_refinement={refined}");
+        let mut command = evaluate(run.path());
+        command.args(["--set", &option, "--json"]).arg(&file);
+        command.assert().success();
+        json(&file)
+    };
+    let kept = run.path().join("evaluation.json");
+    let refined = scored(true);
+    assert!(!kept.exists());
+    let plain = scored(false);
+    assert_eq!(json(&kept), plain);
+    let share = |scores: &Value| scores["avf"]["avg"].as_f64().unwrap();
+    assert!(share(&refined) > share(&plain), "{refined} {plain}");
+    evaluate(run.path())
+        .args(["--set", "model.heads=1"])
+        .assert()
+        .failure()
+        .stderr(contains("model.heads"));
+}
+
+#[test]
 fn clips_that_a_run_was_trained_on_are_not_set_aside_afterwards_without_consent() {
     let run = copied_run();
     let asked = || {

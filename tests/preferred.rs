@@ -11,10 +11,8 @@ use keydance::data::{DanceClip, DataConfig, RootFrame, Standardisation, window_f
 use keydance::evaluation::window_request;
 use keydance::models::gradient_check::generated_windows;
 use keydance::models::pan2021::Pan2021Config;
-use keydance::models::velocity_refinement::refine;
 use keydance::models::{
-    Batch, Feed, ModelConfig, Network, SingleFrame, TrainedModel, Transition, TransitionModel,
-    TransitionRequest,
+    Batch, Feed, Network, SingleFrame, TrainedModel, Transition, TransitionModel, TransitionRequest,
 };
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
@@ -159,7 +157,7 @@ fn trained(
         Box::new(built.network) as Box<dyn Network<f32>>,
         built.parameters,
         standardisation.clone(),
-        ModelConfig::Pan2021(config).root_frame(),
+        config.root_frame,
     )
 }
 
@@ -457,30 +455,4 @@ fn the_control_path_sees_controls_twenty_frames_ahead_that_the_controllers_do_no
     };
     assert_eq!(first_changed(&with_control_path()), 30 - 20);
     assert!((30 - 4..30).contains(&first_changed(&residual())));
-}
-
-#[test]
-fn a_trained_model_refines_its_transitions_where_its_config_says_so() {
-    let clip = &clips()[0];
-    let window = window_features(&clip.features, 30, 20);
-    let request = window_request(&clip.clip, 30, window.view()).unwrap();
-    let standardisation = RootFrame::World.standardisation([clip.features.view()], 20);
-    let [plain, refined] = [false, true].map(|velocity_refinement| {
-        let config = Pan2021Config {
-            velocity_refinement,
-            ..with_control_path().small()
-        };
-        let built: Built<f32> = build(&config, &standardisation).disturbed();
-        let model = trained(config, built, &standardisation);
-        let [transition] = model
-            .transitions(std::slice::from_ref(&request))
-            .unwrap()
-            .try_into()
-            .unwrap();
-        transition.frames
-    });
-    let mut expected = plain.clone();
-    refine(&request, expected.view_mut());
-    assert_eq!(refined, expected);
-    assert_ne!(refined, plain);
 }

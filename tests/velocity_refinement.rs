@@ -1,5 +1,6 @@
 //! Predicted bodies brought to the velocity factors that were asked for.
 
+use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, window_features};
 use keydance::evaluation::window_request;
@@ -9,7 +10,8 @@ use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
 use keydance::motion::velocity_factor::{PART_WEIGHTS, measured_velocity_factors};
-use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate, s};
+use keydance::motion::{DANCE_PARENTS, JOINTS};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -95,9 +97,10 @@ fn a_slow_and_trembling_motion_becomes_as_fast_as_asked_and_smooth_and_no_furthe
         [&predicted, &refined].map(|frames| measure(window.view(), frames))
     };
     let [before, after] = before_and_after(missed);
-    assert!(after < 0.25 * before, "velocity factors: {before}, {after}");
+    assert!(after < before / 3.0, "velocity factors: {before}, {after}");
     let [before, after] = before_and_after(acceleration);
-    assert!(after < 0.5 * before, "acceleration: {before}, {after}");
+    // Half of what makes bone lengths tremble stays.
+    assert!(after < 0.6 * before, "acceleration: {before}, {after}");
     let [before, after] = before_and_after(distance);
     assert!(after < before, "distance: {before}, {after}");
 }
@@ -130,7 +133,10 @@ fn a_straight_motion_that_is_as_fast_as_asked_stays_as_it_is() {
     let first = window.row(0).to_owned();
     for (t, mut row) in window.rows_mut().into_iter().enumerate() {
         row.assign(&first);
-        for number in BODY_POSITIONS.start..ROOT_POSITION.end {
+        for number in BODY_POSITIONS {
+            row[number] *= 1.0 + 0.01 * t as f64;
+        }
+        for number in ROOT_POSITION {
             row[number] += t as f64 * (number as f64).sin();
         }
     }
@@ -145,6 +151,51 @@ fn a_straight_motion_that_is_as_fast_as_asked_stays_as_it_is() {
         for t in 0..20 {
             let moved = refined[[t, number]] - predicted[[t, number]];
             assert!(moved.abs() < 1e-9, "{t} {number}: {moved}");
+        }
+    }
+}
+
+/// A joint's place from the root, cm.
+fn joint_at(body: ArrayView1<f64>, joint: usize) -> DVec3 {
+    match joint.checked_sub(1) {
+        None => DVec3::ZERO,
+        Some(at) => DVec3::new(body[3 * at], body[3 * at + 1], body[3 * at + 2]),
+    }
+}
+
+/// From its parent to a joint, cm.
+fn bone(body: ArrayView1<f64>, joint: usize) -> DVec3 {
+    joint_at(body, joint) - joint_at(body, DANCE_PARENTS[joint].unwrap())
+}
+
+fn bone_length(body: ArrayView1<f64>, joint: usize) -> f64 {
+    bone(body, joint).length()
+}
+
+#[test]
+fn bones_of_the_dancers_lengths_keep_them() {
+    let (window, request) = transition(&clip(), 60);
+    let mut predicted = window.slice(s![1.., ..FRAME]).to_owned();
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    for mut frame in predicted.rows_mut().into_iter().take(59) {
+        let recorded = frame.to_owned();
+        for joint in 1..JOINTS {
+            let mut turned = || rng.random_range(-0.3..0.3);
+            let turn = DQuat::from_scaled_axis(DVec3::new(turned(), turned(), turned()));
+            let placed = joint_at(frame.view(), DANCE_PARENTS[joint].unwrap())
+                + turn * bone(recorded.view(), joint);
+            for (axis, number) in placed.to_array().into_iter().enumerate() {
+                frame[3 * joint - 3 + axis] = number;
+            }
+        }
+    }
+    let refined = refined(&request, &predicted);
+    assert_ne!(refined, predicted);
+    for frame in refined.rows() {
+        for joint in 1..JOINTS {
+            let expected = bone_length(window.row(0), joint);
+            let found = bone_length(frame, joint);
+            assert!((found - expected).abs() < 1e-9, "{joint}: {found}");
         }
     }
 }
@@ -235,6 +286,20 @@ fn expected(request: &TransitionRequest, frames: &Array2<f64>) -> Array2<f64> {
         for number in BODY_POSITIONS {
             let solved = solve(matrix.clone(), right.column(number).to_owned());
             x.column_mut(number).assign(&solved);
+        }
+        let solved = x.clone();
+        for t in 1..n {
+            for joint in 1..JOINTS {
+                let bone = bone(solved.row(t), joint);
+                let share = t as f64 / n as f64;
+                let [first, here, last] = [0, t, n].map(|t| bone_length(p.row(t), joint));
+                let wanted = (here + (1.0 - share) * first + share * last) / 2.0;
+                let parent = joint_at(x.row(t), DANCE_PARENTS[joint].unwrap());
+                let placed = parent + bone * wanted / bone.length();
+                for (axis, number) in placed.to_array().into_iter().enumerate() {
+                    x[[t, 3 * joint - 3 + axis]] = number;
+                }
+            }
         }
     }
     x.slice(s![1.., ..]).to_owned()

@@ -30,14 +30,14 @@ pub struct EvaluateArgs {
     /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is the mean over these
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
     lengths: Vec<u16>,
-    /// Write the scores here, too; a run's folder gets those at the paper's lengths anyway, as evaluation.json
+    /// Write the scores here, too; a run's folder gets those of its own model at the paper's lengths anyway, as evaluation.json
     /// (evaluation_validation.json, evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Override a key of the config, such as data.split.share=0.8; may be repeated
+    /// Override a key of the config, such as data.split.share=0.8; of a run's model only model.velocity_refinement; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Evaluate on other data than the run was trained on, or split otherwise
@@ -90,9 +90,12 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
-    let own_lengths = subject.run.is_some() && !args.lengths.is_empty();
+    let of_its_own = match &subject.run {
+        Some(run) => args.lengths.is_empty() && run.config()?.model == subject.config.model,
+        None => true,
+    };
     if let Some(folder) = subject.folder(args.out.as_deref())?
-        && !own_lengths
+        && of_its_own
     {
         record.write(folder)?;
     }

@@ -98,11 +98,6 @@ pub trait Network<T: Real>: Send + Sync {
         0
     }
 
-    /// Whether its predictions are brought to the velocity factors that were asked for, see [`super::velocity_refinement`].
-    fn refines_velocities(&self) -> bool {
-        false
-    }
-
     /// Whether the parameter of this name is a Transformer's, see [`crate::optim::AdamConfig::transformer_learning_rate`].
     fn in_transformer(&self, _parameter: &str) -> bool {
         false

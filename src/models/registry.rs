@@ -71,6 +71,22 @@ impl ModelConfig {
         }
     }
 
+    /// Whether what its network predicts is brought to the velocity factors that were asked for, see [`super::velocity_refinement`].
+    pub fn refines_velocities(&self) -> bool {
+        match self {
+            Self::Pan2021(config) => config.velocity_refinement,
+            _ => false,
+        }
+    }
+
+    /// The same model, for the same weights, with its predictions brought to the velocity factors or not, where it can do so.
+    pub fn refining_velocities(mut self, refining: bool) -> Self {
+        if let Self::Pan2021(config) = &mut self {
+            config.velocity_refinement = refining;
+        }
+        self
+    }
+
     /// Whether some of its weights are [`Network::in_transformer`].
     pub fn has_transformers(&self) -> bool {
         match self {

@@ -20,6 +20,7 @@ pub struct TrainedModel {
     parameters: Parameters<f32>,
     standardisation: Standardisation,
     root_frame: RootFrame,
+    refines_velocities: bool,
     workspaces: Mutex<Vec<Workspace<f32>>>,
 }
 
@@ -38,7 +39,16 @@ impl TrainedModel {
             parameters,
             standardisation,
             root_frame,
+            refines_velocities: false,
             workspaces: Mutex::new(Vec::new()),
+        }
+    }
+
+    /// The same model, with its predictions brought to the velocity factors that were asked for or as the network gives them.
+    pub fn refining_velocities(self, refining: bool) -> Self {
+        Self {
+            refines_velocities: refining,
+            ..self
         }
     }
 
@@ -136,7 +146,7 @@ impl TrainedModel {
                 .rows_mut()
                 .into_iter()
                 .for_each(|row| frame.leave(row));
-            if self.network.refines_velocities() {
+            if self.refines_velocities {
                 velocity_refinement::refine(request, frames.view_mut());
             }
             let transition = Transition { frames };

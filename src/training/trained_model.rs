@@ -43,9 +43,11 @@ impl RunFolder {
         let path = self.newest_weights()?;
         let saved = SavedWeights::read(&path)?;
         let origin = format!("the config in {}", path.display());
-        // Only the model's table concerns the weights.
+        // Only the model's table concerns the weights, and nothing in it that begins after the prediction.
+        let refining = config.model.refines_velocities();
+        let model = ExperimentConfig::parse(&saved.config, &origin)?.model;
         let trained = ExperimentConfig {
-            model: ExperimentConfig::parse(&saved.config, &origin)?.model,
+            model: model.refining_velocities(refining),
             ..config.clone()
         };
         let differences = trained.differences(config)?;
@@ -63,6 +65,7 @@ impl RunFolder {
             parameters,
             saved.standardisation,
             config.model.root_frame(),
-        ))
+        )
+        .refining_velocities(refining))
     }
 }

@@ -55,12 +55,15 @@ pub struct GenerateArgs {
     /// Write what is printed here, too, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Override a key of the config; of a run's model only model.velocity_refinement, such as model.velocity_refinement=false; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
 }
 
 /// # Errors
 /// The run, a file or a control cannot be used, or they do not fit each other; nothing is written then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
-    let subject = Subject::open(&args.run, &[])?;
+    let subject = Subject::open(&args.run, &args.set)?;
     let keyframes = Keyframes::read(&args.keyframes, &subject.config.data)?;
     let request = keyframes.request(&args.keyframes)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;

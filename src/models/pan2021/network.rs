@@ -436,10 +436,6 @@ impl<T: Real> Network<T> for Pan2021 {
         }
     }
 
-    fn refines_velocities(&self) -> bool {
-        self.config.velocity_refinement
-    }
-
     fn in_transformer(&self, parameter: &str) -> bool {
         let (part, _) = parameter.split_once('.').unwrap_or((parameter, ""));
         self.config.controllers == Controllers::Transformer
