@@ -134,6 +134,33 @@ fn shares_of_way(path: &[[f64; 3]]) -> Vec<f64> {
 }
 
 #[test]
+fn a_motion_of_the_same_weights_is_nearer_to_the_speeds_asked_for_where_it_is_refined() {
+    let out = TempDir::new().unwrap();
+    let factors = |clip: Clip| {
+        let clip = DanceClip::new(clip, None, &DataConfig::default()).unwrap();
+        clip.features.slice(s![.., VELOCITY_FACTORS]).to_owned()
+    };
+    let asked = factors(read(&CLIPS[0]));
+    let missed = |refined: bool| {
+        let file = out.path().join(format!("{refined}.bvh"));
+        let option = format!("model.velocity_refinement={refined}");
+        let mut command = three_keyframes("run");
+        command.args(["--set", &option, "--out"]).arg(&file);
+        command.assert().success();
+        let missed = factors(read(&file)) - asked.slice(s![20..141, ..]);
+        missed.mapv(f64::abs).mean().unwrap()
+    };
+    let [plain, refined] = [false, true].map(missed);
+    assert!(refined < 0.8 * plain, "{refined} {plain}");
+    three_keyframes("run")
+        .args(["--set", "model.heads=1", "--out"])
+        .arg(out.path().join("other.bvh"))
+        .assert()
+        .failure()
+        .stderr(contains("model.heads"));
+}
+
+#[test]
 fn controls_combine() {
     let out = TempDir::new().unwrap();
     let at = |name: &str| out.path().join(name);
