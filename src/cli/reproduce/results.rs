@@ -181,6 +181,9 @@ pub fn table_row(
             "diverged: a loss or gradient was not finite after step {} of {}",
             manifest.steps_done, manifest.steps
         ),
+        (Some(manifest), None) if manifest.state == RunState::Finished => {
+            "trained, but not evaluated yet".into()
+        }
         (Some(manifest), None) => format!(
             "not trained yet: {} of {} steps at the last checkpoint",
             manifest.steps_done, manifest.steps
