@@ -11,7 +11,7 @@ use keydance::motion::features::{
 };
 use keydance::motion::velocity_factor::{PART_WEIGHTS, measured_velocity_factors};
 use keydance::motion::{DANCE_PARENTS, JOINTS};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, concatenate, s};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -32,7 +32,22 @@ fn transition(clip: &DanceClip, length: usize) -> (Array2<f64>, TransitionReques
     (window, request)
 }
 
-/// What a model might predict: half of the movement about the mean pose, trembling by up to 1 cm, with the true keyframe at the end.
+/// Turns each bone by up to `angle` about each axis; lengths stay.
+fn turn_bones(mut frame: ArrayViewMut1<f64>, rng: &mut ChaCha8Rng, angle: f64) {
+    let before = frame.to_owned();
+    for joint in 1..JOINTS {
+        let mut turned = || rng.random_range(-angle..angle);
+        let turn = DQuat::from_scaled_axis(DVec3::new(turned(), turned(), turned()));
+        let placed = joint_at(frame.view(), DANCE_PARENTS[joint].unwrap())
+            + turn * bone(before.view(), joint);
+        for (axis, number) in placed.to_array().into_iter().enumerate() {
+            frame[3 * joint - 3 + axis] = number;
+        }
+    }
+}
+
+/// What a model might predict: half of the movement about the mean pose, its bones trembling by up to 0.05 rad, with the true keyframe at
+/// the end.
 fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let last = window.nrows() - 1;
@@ -40,9 +55,9 @@ fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
     let mean = window.mean_axis(Axis(0)).unwrap();
     for mut frame in frames.rows_mut().into_iter().take(last - 1) {
         for number in BODY_POSITIONS {
-            let middle = (frame[number] + mean[number]) / 2.0;
-            frame[number] = middle + rng.random_range(-1.0..1.0);
+            frame[number] = (frame[number] + mean[number]) / 2.0;
         }
+        turn_bones(frame, &mut rng, 0.05);
     }
     frames
 }
@@ -97,10 +112,9 @@ fn a_slow_and_trembling_motion_becomes_as_fast_as_asked_and_smooth_and_no_furthe
         [&predicted, &refined].map(|frames| measure(window.view(), frames))
     };
     let [before, after] = before_and_after(missed);
-    assert!(after < before / 3.0, "velocity factors: {before}, {after}");
+    assert!(after < 0.25 * before, "velocity factors: {before}, {after}");
     let [before, after] = before_and_after(acceleration);
-    // Half of what makes bone lengths tremble stays.
-    assert!(after < 0.6 * before, "acceleration: {before}, {after}");
+    assert!(after < 0.5 * before, "acceleration: {before}, {after}");
     let [before, after] = before_and_after(distance);
     assert!(after < before, "distance: {before}, {after}");
 }
@@ -177,17 +191,8 @@ fn bones_of_the_dancers_lengths_keep_them() {
     let (window, request) = transition(&clip(), 60);
     let mut predicted = window.slice(s![1.., ..FRAME]).to_owned();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    for mut frame in predicted.rows_mut().into_iter().take(59) {
-        let recorded = frame.to_owned();
-        for joint in 1..JOINTS {
-            let mut turned = || rng.random_range(-0.3..0.3);
-            let turn = DQuat::from_scaled_axis(DVec3::new(turned(), turned(), turned()));
-            let placed = joint_at(frame.view(), DANCE_PARENTS[joint].unwrap())
-                + turn * bone(recorded.view(), joint);
-            for (axis, number) in placed.to_array().into_iter().enumerate() {
-                frame[3 * joint - 3 + axis] = number;
-            }
-        }
+    for frame in predicted.rows_mut().into_iter().take(59) {
+        turn_bones(frame, &mut rng, 0.3);
     }
     let refined = refined(&request, &predicted);
     assert_ne!(refined, predicted);
