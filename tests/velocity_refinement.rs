@@ -11,7 +11,7 @@ use keydance::motion::features::{
 };
 use keydance::motion::velocity_factor::{PART_WEIGHTS, measured_velocity_factors};
 use keydance::motion::{DANCE_PARENTS, JOINTS};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, concatenate, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -32,22 +32,7 @@ fn transition(clip: &DanceClip, length: usize) -> (Array2<f64>, TransitionReques
     (window, request)
 }
 
-/// Turns each bone by up to `angle` about each axis; lengths stay.
-fn turn_bones(mut frame: ArrayViewMut1<f64>, rng: &mut ChaCha8Rng, angle: f64) {
-    let before = frame.to_owned();
-    for joint in 1..JOINTS {
-        let mut turned = || rng.random_range(-angle..angle);
-        let turn = DQuat::from_scaled_axis(DVec3::new(turned(), turned(), turned()));
-        let placed = joint_at(frame.view(), DANCE_PARENTS[joint].unwrap())
-            + turn * bone(before.view(), joint);
-        for (axis, number) in placed.to_array().into_iter().enumerate() {
-            frame[3 * joint - 3 + axis] = number;
-        }
-    }
-}
-
-/// What a model might predict: half of the movement about the mean pose, its bones trembling by up to 0.05 rad, with the true keyframe at
-/// the end.
+/// What a model might predict: half of the movement about the mean pose, trembling by up to 1 cm, with the true keyframe at the end.
 fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let last = window.nrows() - 1;
@@ -55,9 +40,9 @@ fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
     let mean = window.mean_axis(Axis(0)).unwrap();
     for mut frame in frames.rows_mut().into_iter().take(last - 1) {
         for number in BODY_POSITIONS {
-            frame[number] = (frame[number] + mean[number]) / 2.0;
+            let middle = (frame[number] + mean[number]) / 2.0;
+            frame[number] = middle + rng.random_range(-1.0..1.0);
         }
-        turn_bones(frame, &mut rng, 0.05);
     }
     frames
 }
@@ -191,8 +176,17 @@ fn bones_of_the_dancers_lengths_keep_them() {
     let (window, request) = transition(&clip(), 60);
     let mut predicted = window.slice(s![1.., ..FRAME]).to_owned();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    for frame in predicted.rows_mut().into_iter().take(59) {
-        turn_bones(frame, &mut rng, 0.3);
+    for mut frame in predicted.rows_mut().into_iter().take(59) {
+        let recorded = frame.to_owned();
+        for joint in 1..JOINTS {
+            let mut turned = || rng.random_range(-0.3..0.3);
+            let turn = DQuat::from_scaled_axis(DVec3::new(turned(), turned(), turned()));
+            let placed = joint_at(frame.view(), DANCE_PARENTS[joint].unwrap())
+                + turn * bone(recorded.view(), joint);
+            for (axis, number) in placed.to_array().into_iter().enumerate() {
+                frame[3 * joint - 3 + axis] = number;
+            }
+        }
     }
     let refined = refined(&request, &predicted);
     assert_ne!(refined, predicted);
@@ -245,12 +239,25 @@ fn expected(request: &TransitionRequest, frames: &Array2<f64>) -> Array2<f64> {
     };
     let steps = stencil(n, &[-1.0, 1.0]);
     let bends = stencil(n - 1, &[1.0, -2.0, 1.0]);
-    let mut matrix =
-        Array2::<f64>::eye(n + 1) + 100.0 * bends.t().dot(&bends) + 300.0 * steps.t().dot(&steps);
-    for end in [0, n] {
-        matrix.row_mut(end).fill(0.0);
-        matrix[[end, end]] = 1.0;
+    let mut smooth = Array2::<f64>::eye(n + 1) + 100.0 * bends.t().dot(&bends);
+    let mut matrix = &smooth + 300.0 * steps.t().dot(&steps);
+    for matrix in [&mut smooth, &mut matrix] {
+        for end in [0, n] {
+            matrix.row_mut(end).fill(0.0);
+            matrix[[end, end]] = 1.0;
+        }
     }
+    let lengths: Vec<Array1<f64>> = (1..JOINTS)
+        .map(|joint| {
+            let lengths = (0..=n).map(|t| bone_length(p.row(t), joint)).collect();
+            let smoothed = solve(smooth.clone(), lengths);
+            Array1::from_shape_fn(n + 1, |t| {
+                let share = t as f64 / n as f64;
+                let of_dancer = (1.0 - share) * smoothed[0] + share * smoothed[n];
+                (smoothed[t] + of_dancer) / 2.0
+            })
+        })
+        .collect();
     let mut x = p.clone();
     for _ in 0..10 {
         let mut w = steps.dot(&x);
@@ -296,9 +303,7 @@ fn expected(request: &TransitionRequest, frames: &Array2<f64>) -> Array2<f64> {
         for t in 1..n {
             for joint in 1..JOINTS {
                 let bone = bone(solved.row(t), joint);
-                let share = t as f64 / n as f64;
-                let [first, here, last] = [0, t, n].map(|t| bone_length(p.row(t), joint));
-                let wanted = (here + (1.0 - share) * first + share * last) / 2.0;
+                let wanted = lengths[joint - 1][t];
                 let parent = joint_at(x.row(t), DANCE_PARENTS[joint].unwrap());
                 let placed = parent + bone * wanted / bone.length();
                 for (axis, number) in placed.to_array().into_iter().enumerate() {

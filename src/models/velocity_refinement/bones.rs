@@ -1,6 +1,7 @@
 //! The lengths of a body's bones.
 
-use super::Body;
+use super::system::System;
+use super::{ACCELERATION_WEIGHT, Body, rough};
 use crate::motion::{DANCE_PARENTS, JOINTS};
 
 /// The length of the bone that leads to each joint but the root, cm.
@@ -24,22 +25,37 @@ fn length(bone: [f64; 3]) -> f64 {
     bone.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The lengths that bones are to have in every frame, k1 first: the mean of those they have and of the dancer's.
+/// The lengths that bones are to have in every frame, k1 first: the mean of those they have, made smooth, and of the dancer's.
 pub fn lengths_wanted(predicted: &[Body]) -> Vec<Lengths> {
     let has = |body: &Body| -> Lengths { std::array::from_fn(|joint| length(bone(body, joint))) };
+    let mut lengths: Vec<Lengths> = predicted.iter().map(has).collect();
+    smooth(&mut lengths);
     let steps = predicted.len() - 1;
-    let [first, last] = [0, steps].map(|t| has(&predicted[t]));
-    let bodies = predicted.iter().enumerate();
-    bodies
-        .map(|(t, body)| {
-            let share = t as f64 / steps as f64;
-            let has = has(body);
-            std::array::from_fn(|joint| {
-                let of_dancer = first[joint] + share * (last[joint] - first[joint]);
-                (has[joint] + of_dancer) / 2.0
-            })
-        })
-        .collect()
+    let [first, last] = [lengths[0], lengths[steps]];
+    for (t, lengths) in lengths.iter_mut().enumerate() {
+        let share = t as f64 / steps as f64;
+        for (joint, length) in lengths.iter_mut().enumerate() {
+            let of_dancer = first[joint] + share * (last[joint] - first[joint]);
+            *length = (*length + of_dancer) / 2.0;
+        }
+    }
+    lengths
+}
+
+/// Replaces the lengths l of the frames between the keyframes by the x of least `sum_t |x_t - l_t|^2 + 100 |x_(t+1) - 2 x_t + x_(t-1)|^2`.
+fn smooth(lengths: &mut [Lengths]) {
+    let steps = lengths.len() - 1;
+    let rough = rough(lengths);
+    let mut change: Vec<Lengths> = rough[1..steps]
+        .iter()
+        .map(|rough| rough.map(|rough| -ACCELERATION_WEIGHT * rough))
+        .collect();
+    System::new(steps, 0.0, ACCELERATION_WEIGHT).solve(&mut change);
+    for (lengths, change) in lengths[1..].iter_mut().zip(&change) {
+        for (length, change) in lengths.iter_mut().zip(change) {
+            *length += change;
+        }
+    }
 }
 
 /// The body with its bones in their directions, but of these lengths.

@@ -11,8 +11,8 @@
 //! where w_t are the velocities that a motion has, each joint's times the ratio of the velocity factor (eq. 1) asked for to the one its part of
 //! the body has in that frame. Ten times, beginning with p itself, w is taken from the last x, x is the minimum (a linear system with two
 //! diagonals beside the main one, the same for all 69 numbers), and then each bone, from the root outwards, keeps its direction and gets the mean
-//! of two lengths: that in p_t, and the dancer's, which goes evenly from k1's to p_N's. (Constraints met by turns: projective dynamics, Bouaziz
-//! et al., ACM TOG 33(4), 2014.)
+//! of two lengths: that in p_t and the dancer's, which goes evenly from k1's to p_N's. The lengths in p are smoothed
+//! over time beforehand, by the first two terms. (Constraints met by turns: projective dynamics, Bouaziz et al., ACM TOG 33(4), 2014.)
 //!
 //! A mean of motions has short bones where these differ, and so is nearer to each of them than a body with the dancer's own; but joints that
 //! are as fast as asked on short bones are too fast once rotations put them on the skeleton's. Halfway had the best LRP on validation clips.
@@ -48,7 +48,7 @@ pub fn refine(request: &TransitionRequest, mut frames: ArrayViewMut2<f64>) {
     let mut predicted = vec![body(request.start.features.view())];
     predicted.extend(frames.rows().into_iter().map(body));
     let steps = Steps::new(request, &frames);
-    let system = System::new(frames.nrows());
+    let system = System::new(frames.nrows(), VELOCITY_WEIGHT, ACCELERATION_WEIGHT);
     let rough = rough(&predicted);
     let lengths = lengths_wanted(&predicted);
     let mut refined = predicted.clone();
@@ -83,11 +83,11 @@ pub fn refine(request: &TransitionRequest, mut frames: ArrayViewMut2<f64>) {
 }
 
 /// The gradient of half the sum of squared second differences, for every frame.
-fn rough(bodies: &[Body]) -> Vec<Body> {
-    let mut rough = vec![[0.0; NUMBERS]; bodies.len()];
-    for t in 1..bodies.len().saturating_sub(1) {
+fn rough<const NUMBERS: usize>(values: &[[f64; NUMBERS]]) -> Vec<[f64; NUMBERS]> {
+    let mut rough = vec![[0.0; NUMBERS]; values.len()];
+    for t in 1..values.len().saturating_sub(1) {
         for i in 0..NUMBERS {
-            let bend = bodies[t - 1][i] - 2.0 * bodies[t][i] + bodies[t + 1][i];
+            let bend = values[t - 1][i] - 2.0 * values[t][i] + values[t + 1][i];
             rough[t - 1][i] += bend;
             rough[t][i] -= 2.0 * bend;
             rough[t + 1][i] += bend;

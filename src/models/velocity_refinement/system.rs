@@ -1,7 +1,5 @@
 //! The linear system whose solution is nearest to what is asked, smooth and of the speed that is asked for.
 
-use super::{ACCELERATION_WEIGHT, Body, VELOCITY_WEIGHT};
-
 /// The matrix of the linear system in frames k1 + 1 .. k2 - 1 as L D L^T, L with ones in its main diagonal and two diagonals below.
 pub struct System {
     diagonal: Vec<f64>,
@@ -10,24 +8,24 @@ pub struct System {
 }
 
 impl System {
-    /// For transitions of `length` frames.
-    pub fn new(length: usize) -> Self {
+    /// For transitions of `length` frames, with these weights of steps and of second differences; values themselves have weight 1.
+    pub fn new(length: usize, step_weight: f64, acceleration_weight: f64) -> Self {
         let mut matrix = vec![[0.0; 3]; length + 1]; // columns t, t + 1, t + 2 of row t
         for row in &mut matrix {
             row[0] = 1.0;
         }
         for t in 0..length {
-            matrix[t][0] += VELOCITY_WEIGHT;
-            matrix[t + 1][0] += VELOCITY_WEIGHT;
-            matrix[t][1] -= VELOCITY_WEIGHT;
+            matrix[t][0] += step_weight;
+            matrix[t + 1][0] += step_weight;
+            matrix[t][1] -= step_weight;
         }
         for t in 1..length {
-            matrix[t - 1][0] += ACCELERATION_WEIGHT;
-            matrix[t - 1][1] -= 2.0 * ACCELERATION_WEIGHT;
-            matrix[t - 1][2] += ACCELERATION_WEIGHT;
-            matrix[t][0] += 4.0 * ACCELERATION_WEIGHT;
-            matrix[t][1] -= 2.0 * ACCELERATION_WEIGHT;
-            matrix[t + 1][0] += ACCELERATION_WEIGHT;
+            matrix[t - 1][0] += acceleration_weight;
+            matrix[t - 1][1] -= 2.0 * acceleration_weight;
+            matrix[t - 1][2] += acceleration_weight;
+            matrix[t][0] += 4.0 * acceleration_weight;
+            matrix[t][1] -= 2.0 * acceleration_weight;
+            matrix[t + 1][0] += acceleration_weight;
         }
         let rows = matrix[1..length].to_vec();
         let mut diagonal: Vec<f64> = Vec::with_capacity(rows.len());
@@ -49,7 +47,7 @@ impl System {
     }
 
     /// Puts the solution in the place of the right side.
-    pub fn solve(&self, right: &mut [Body]) {
+    pub fn solve<const NUMBERS: usize>(&self, right: &mut [[f64; NUMBERS]]) {
         for t in 0..right.len() {
             for back in 1..=2.min(t) {
                 let factor = self.below[t - back][back - 1];
