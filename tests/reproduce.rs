@@ -75,6 +75,18 @@ fn arguments(place: &Path) -> Vec<PathBuf> {
     arguments
 }
 
+/// `keydance reproduce` into `place` with another folder in the place of one of the fixture's.
+fn reproduce_with(place: &Path, fixture: &str, other: &Path) -> Command {
+    let mut command = Command::cargo_bin("keydance").unwrap();
+    command.args(arguments(place).into_iter().map(|argument| {
+        match argument == FIXTURE.path(fixture) {
+            true => other.into(),
+            false => argument,
+        }
+    }));
+    command
+}
+
 fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
@@ -328,17 +340,7 @@ fn results_and_runs_of_another_budget_or_other_data_are_refused_with_both_sides(
     );
     let other_data = TempDir::new().unwrap();
     write_clips(other_data.path(), 180, 4);
-    let on_other_data = || {
-        let arguments = arguments(place.path()).into_iter().map(|argument| {
-            match argument == FIXTURE.path("data") {
-                true => other_data.path().into(),
-                false => argument,
-            }
-        });
-        let mut command = Command::cargo_bin("keydance").unwrap();
-        command.args(arguments);
-        command
-    };
+    let on_other_data = || reproduce_with(place.path(), "data", other_data.path());
     let digest = json(&place.path().join("results/manifest.json"))["data_digest"]
         .as_str()
         .unwrap()
@@ -351,6 +353,33 @@ fn results_and_runs_of_another_budget_or_other_data_are_refused_with_both_sides(
     refused.stderr(contains("schedule.fraction: 0.05, 0.04").and(contains("runs")));
     let refused = on_other_data().assert().failure();
     refused.stderr(contains(&digest).and(contains("now has digest")));
+}
+
+#[test]
+fn velocity_refinement_scores_the_same_weights_anew() {
+    let place = TempDir::new().unwrap();
+    copy(REPRODUCED.path(), place.path());
+    let one = TempDir::new().unwrap();
+    fs::copy(
+        FIXTURE.path("configs/whole_model.toml"),
+        one.path().join("whole_model.toml"),
+    )
+    .unwrap();
+    let refined = || {
+        let mut command = reproduce_with(place.path(), "configs", one.path());
+        command.args(["--set", "model.velocity_refinement=true"]);
+        command
+    };
+    let refused = refined().assert().failure();
+    refused.stderr(contains("model.velocity_refinement: false, true").and(contains("remove")));
+    fs::remove_dir_all(place.path().join("results")).unwrap();
+    refined().assert().success();
+    assert_eq!(
+        weights(place.path(), "whole_model"),
+        weights(REPRODUCED.path(), "whole_model")
+    );
+    let lrp = |place: &TempDir| lrp_lines(place.path(), "Whole model");
+    assert_ne!(lrp(&place), lrp(&REPRODUCED));
 }
 
 #[test]

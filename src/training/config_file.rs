@@ -131,6 +131,19 @@ impl ExperimentConfig {
             .map(|(key, ours, theirs)| format!("{key}: {ours}, {theirs}"))
             .collect())
     }
+
+    /// The differences that a training would notice: all but what begins after the network's prediction.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    pub fn training_differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
+        let refining = other.model.refines_velocities();
+        let same_after_prediction = Self {
+            model: self.model.clone().refining_velocities(refining),
+            ..self.clone()
+        };
+        same_after_prediction.differences(other)
+    }
 }
 
 fn flatten(key: &str, value: &Value, found: &mut Vec<(String, String)>) {

@@ -43,14 +43,12 @@ impl RunFolder {
         let path = self.newest_weights()?;
         let saved = SavedWeights::read(&path)?;
         let origin = format!("the config in {}", path.display());
-        // Only the model's table concerns the weights, and nothing in it that begins after the prediction.
-        let refining = config.model.refines_velocities();
-        let model = ExperimentConfig::parse(&saved.config, &origin)?.model;
+        // Only the model's table concerns the weights.
         let trained = ExperimentConfig {
-            model: model.refining_velocities(refining),
+            model: ExperimentConfig::parse(&saved.config, &origin)?.model,
             ..config.clone()
         };
-        let differences = trained.differences(config)?;
+        let differences = trained.training_differences(config)?;
         if !differences.is_empty() {
             return Err(TrainingError::OtherModel { path, differences });
         }
@@ -66,6 +64,6 @@ impl RunFolder {
             saved.standardisation,
             config.model.root_frame(),
         )
-        .refining_velocities(refining))
+        .refining_velocities(config.model.refines_velocities()))
     }
 }

@@ -238,7 +238,15 @@ impl Workshop<'_> {
             }
             return Ok(());
         }
-        let differences = run.config()?.differences(&row.config)?;
+        let manifest = run.manifest()?;
+        let config = run.config()?;
+        let differences = match &manifest {
+            // Nothing of it is trained any more.
+            Some(manifest) if manifest.state == RunState::Finished => {
+                config.training_differences(&row.config)?
+            }
+            _ => config.differences(&row.config)?,
+        };
         if !differences.is_empty() {
             return Err(TrainingError::OtherConfig {
                 path: run.config_path(),
@@ -246,7 +254,7 @@ impl Workshop<'_> {
             }
             .into());
         }
-        match run.manifest()? {
+        match manifest {
             Some(manifest) if manifest.data_digest != self.dataset.digest => {
                 Err(TrainingError::OtherData {
                     path: run.path().into(),
