@@ -77,6 +77,8 @@ pub struct Pan2021Config {
     pub control_path: bool,
     /// Control paths whose mean is taken: an ensemble.
     pub control_path_members: usize,
+    /// Both hidden layers of a control path.
+    pub control_path_hidden: usize,
     /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
     pub single_frames: usize,
     /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper, see
@@ -108,6 +110,7 @@ impl Default for Pan2021Config {
             output: Output::Absolute,
             control_path: false,
             control_path_members: 1,
+            control_path_hidden: 512,
             single_frames: 512,
             velocity_refinement: false,
             hidden: 512,
@@ -127,6 +130,7 @@ impl Pan2021Config {
     /// The same structure in small sizes (8 numbers a code, 2 heads), for checks in f64.
     pub fn small(&self) -> Self {
         Self {
+            control_path_hidden: 8,
             hidden: 8,
             code: 8,
             heads: 2,
@@ -162,6 +166,7 @@ impl Pan2021Config {
         }
         for (key, value, most) in [
             ("control_path_members", self.control_path_members, 64),
+            ("control_path_hidden", self.control_path_hidden, 65_536),
             ("hidden", self.hidden, 65_536),
             ("code", self.code, 4096),
             ("heads", self.heads, 256),

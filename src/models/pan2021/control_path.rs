@@ -94,7 +94,7 @@ impl<'f, T: Real> Place<'f, T> {
 
 impl ControlPath {
     pub fn new<T: Real, R: Rng>(init: &mut Initialiser<'_, T, R>, config: &Pan2021Config) -> Self {
-        let (seen, hidden) = (2 * seen(config.velocity_factor), config.hidden);
+        let (seen, hidden) = (2 * seen(config.velocity_factor), config.control_path_hidden);
         let first = Member::new(init, "control_path", seen, hidden);
         let others = (2..=config.control_path_members)
             .map(|member| Member::new(init, &format!("control_path_{member}"), seen, hidden));
