@@ -14,7 +14,9 @@ use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
     VELOCITY_FACTORS,
 };
-use keydance::motion::{DANCE_JOINTS, FeatureConfig, FeatureError, features, mirror_image};
+use keydance::motion::{
+    DANCE_JOINTS, FeatureConfig, FeatureError, at_tempo, features, mirror_image,
+};
 use ndarray::{Array2, s};
 use proptest::prelude::*;
 
@@ -136,6 +138,25 @@ fn contacts_follow_the_world_and_the_threshold() {
     assert_eq!(labels(0.4, 0.2), [1.0; 20]);
     assert_eq!(labels(0.5, 0.2), [0.0; 20]);
     assert_eq!(labels(0.5, 0.3), [1.0; 20]);
+}
+
+#[test]
+fn a_clip_at_twice_the_tempo_has_every_second_pose_and_at_half_the_poses_between_too() {
+    let clip = turning_clip("drawn", 41, |t| {
+        let t = t as f64;
+        (DVec3::new(9.0 * t, 90.0 + t, 40.0 - t * t), 0.03 * t - 1.0)
+    });
+    let fast = at_tempo(clip.clone(), 2.0).unwrap();
+    let slow = at_tempo(clip.clone(), 0.5).unwrap();
+    assert_eq!([fast.frame_time, slow.frame_time], [clip.frame_time; 2]);
+    assert_eq!([fast.poses.len(), slow.poses.len()], [21, 81]);
+    for (frame, pose) in clip.poses.iter().enumerate() {
+        assert_eq!(&slow.poses[2 * frame], pose);
+        if frame % 2 == 0 {
+            assert_eq!(&fast.poses[frame / 2], pose);
+        }
+    }
+    assert!(at_tempo(clip, 0.0).is_err());
 }
 
 #[test]

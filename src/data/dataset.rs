@@ -13,7 +13,8 @@ use super::config::DataConfig;
 use super::split::{Parts, check_dance_frames, split};
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{
-    Clip, FeatureError, Mapping, MappingError, ResampleError, features, mirror_image, resample,
+    Clip, FeatureError, Mapping, MappingError, ResampleError, at_tempo, features, mirror_image,
+    resample,
 };
 
 /// A clip on the dance skeleton, with its features.
@@ -112,12 +113,15 @@ impl DanceClip {
     /// # Errors
     /// The image cannot be measured.
     pub fn mirror_image(&self, config: &DataConfig) -> Result<Self, DataError> {
-        let clip = mirror_image(&self.clip);
-        Ok(Self {
-            name: self.name.clone(),
-            features: features(&clip, &config.features())?,
-            clip,
-        })
+        Self::new(mirror_image(&self.clip), None, config)
+    }
+
+    /// The clip danced `tempo` times as fast, see [`at_tempo`].
+    ///
+    /// # Errors
+    /// It would be too long, or cannot be measured.
+    pub fn at_tempo(&self, tempo: f64, config: &DataConfig) -> Result<Self, DataError> {
+        Self::new(at_tempo(self.clip.clone(), tempo)?, None, config)
     }
 
     /// Number of frames.

@@ -15,6 +15,7 @@ pub mod placement;
 pub mod resample;
 pub mod rotation_fit;
 pub mod skeleton;
+pub mod tempo;
 pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
@@ -23,6 +24,7 @@ pub use mapping::{Mapping, MappingError};
 pub use mirror::mirror_image;
 pub use resample::{ResampleError, resample};
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
+pub use tempo::at_tempo;
 pub use velocity_factor::{
     PART_NAMES, PART_WEIGHTS, PARTS, measured_velocity_factors, velocity_factors,
     velocity_factors_between,

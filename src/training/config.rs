@@ -98,6 +98,10 @@ pub struct AugmentationConfig {
     /// Each window that is trained is with probability 1/2 the one that a mirror shows, see [`crate::motion::mirror_image`]; the
     /// statistics of the data are over the clips and their images.
     pub mirror: bool,
+    /// Each window that is trained is, with the same probability, of the recorded clip or of the same clip at one of these tempi (1.25: a
+    /// quarter faster), see [`crate::motion::at_tempo`]; of the recorded one where it would be too long for that at this tempo. The statistics
+    /// of the data leave them out. 16 at most, each from 0.25 to 4; at each, the training clips are in memory once more.
+    pub tempi: Vec<f64>,
 }
 
 /// Scheduled sampling: one draw a batch, ground truth is fed with probability beta.
@@ -198,6 +202,11 @@ impl ExperimentConfig {
         })?;
         check("scheduled_sampling.decay", decay, is_share(decay), || {
             share.into()
+        })?;
+        let tempi = &self.augmentation.tempi;
+        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
+        check("augmentation.tempi", format!("{tempi:?}"), usable, || {
+            "at most 16 tempi from 0.25 to 4".into()
         })?;
         if let ModelConfig::Harvey2020(model) = &self.model {
             let (own, data) = (model.facing_sigma, self.data.facing_sigma);

@@ -4,6 +4,7 @@
 //! cuts them into a batch, runs the shards of the batch on tapes of their own and moves the weights. A [`RunFolder`] keeps the
 //! config, a manifest, a log of every loss and checkpoints, from which the training goes on to the bit.
 
+mod augmentation;
 pub mod checkpoint;
 pub mod config;
 mod config_file;

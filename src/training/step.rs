@@ -67,7 +67,7 @@ fn by_name<S: Serializer>(
     serializer.collect_map(losses.iter().copied())
 }
 
-/// The training clips, after them their mirror images where those are trained too, and how their windows become network input.
+/// What is trained, and how its windows become network input.
 pub(super) struct TrainingWindows<'d> {
     pub clips: Vec<TrainingClip<'d>>,
     pub standardisation: Standardisation,

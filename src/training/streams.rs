@@ -38,6 +38,11 @@ impl Streams {
         self.stream("mirroring", &[step])
     }
 
+    /// At which tempi a step's windows are seen.
+    pub fn tempi(&self, step: u64) -> ChaCha8Rng {
+        self.stream("tempi", &[step])
+    }
+
     /// The frames that a step trains one by one.
     pub fn single_frames(&self, step: u64) -> ChaCha8Rng {
         self.stream("single_frames", &[step])
@@ -76,6 +81,7 @@ mod tests {
                 assert!(firsts.insert(streams.shuffling(index).next_u64()));
                 assert!(firsts.insert(streams.sampling(index as u64).next_u64()));
                 assert!(firsts.insert(streams.mirroring(index as u64).next_u64()));
+                assert!(firsts.insert(streams.tempi(index as u64).next_u64()));
                 assert!(firsts.insert(streams.single_frames(index as u64).next_u64()));
                 for shard in 0..4 {
                     assert!(firsts.insert(streams.dropout(index as u64, shard)));

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rand::RngExt as _;
-use rayon::prelude::*;
 
+use super::augmentation::Augmentation;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::config::ExperimentConfig;
 use super::config_file::ConfigError;
@@ -18,7 +18,7 @@ use super::run_folder::RunFolder;
 use super::schedule::{BatchPlan, Schedule};
 use super::single_frames;
 use super::state::{self, Header};
-use super::step::{StepInput, StepPlan, StepReport, Stepper, TrainingClip, TrainingWindows};
+use super::step::{StepInput, StepPlan, StepReport, Stepper, TrainingWindows};
 use super::streams::Streams;
 use crate::autograd::Parameters;
 use crate::data::{DanceClip, Dataset, Standardisation};
@@ -36,6 +36,7 @@ pub struct Trainer<'d> {
     config_toml: String,
     config_digest: String,
     dataset: &'d Dataset,
+    augmentation: Augmentation,
     windows: TrainingWindows<'d>,
     streams: Streams,
     schedule: Schedule,
@@ -99,15 +100,7 @@ impl<'d> Trainer<'d> {
             cause,
         })?;
         let config_toml = config.to_toml()?;
-        let mut clips: Vec<_> = dataset.train.iter().map(TrainingClip::of).collect();
-        if config.augmentation.mirror {
-            let images: Result<Vec<_>, _> = dataset
-                .train
-                .par_iter()
-                .map(|clip| clip.mirror_image(&config.data).map_err(Box::new))
-                .collect();
-            clips.extend(images?.into_iter().map(TrainingClip::owning));
-        }
+        let (augmentation, clips) = Augmentation::of(&dataset.train, &config)?;
         let streams = Streams::new(config.seed);
         let frames: Vec<usize> = dataset.train.iter().map(DanceClip::frames).collect();
         let schedule = Schedule::new(&frames, &config.schedule, streams);
@@ -124,7 +117,8 @@ impl<'d> Trainer<'d> {
         // Of the longest transitions that are trained.
         let longest = frames.iter().map(|frames| frames.saturating_sub(1)).max();
         let transition = config.schedule.max_len.min(longest.unwrap_or(0));
-        let views = clips.iter().map(|clip| clip.features.view());
+        let measured = &clips[..augmentation.at_recorded_tempo()];
+        let views = measured.iter().map(|clip| clip.features.view());
         let standardisation = root_frame.standardisation(views, transition);
         if let Some(validation) = &config.validation {
             validation.check(dataset)?;
@@ -140,6 +134,7 @@ impl<'d> Trainer<'d> {
                 standardisation,
                 root_frame,
             },
+            augmentation,
             streams,
             schedule,
             adam: Adam::new(config.optimiser, &parameters, |name| {
@@ -403,8 +398,8 @@ impl<'d> Trainer<'d> {
         })
     }
 
-    /// A batch of the schedule with the single frames of its step, each of all these windows with probability 1/2 its mirror image
-    /// where the config says so.
+    /// A batch of the schedule with the single frames of its step, all these windows in a form that
+    /// `[augmentation]` allows.
     fn plan(&self, batch: &BatchPlan, step: u64) -> StepPlan {
         let count = self.network.single_frames();
         let mut plan = StepPlan {
@@ -416,15 +411,9 @@ impl<'d> Trainer<'d> {
                 &mut self.streams.single_frames(step),
             ),
         };
-        if self.config.augmentation.mirror {
-            let mut draws = self.streams.mirroring(step);
-            let single_frames = plan.single_frames.iter_mut().map(|plan| &mut plan.window);
-            for window in plan.windows.iter_mut().chain(single_frames) {
-                if draws.random() {
-                    window.clip += self.dataset.train.len();
-                }
-            }
-        }
+        let clips = &self.windows.clips;
+        self.augmentation
+            .vary(&mut plan, clips, &self.streams, step);
         plan
     }
 
