@@ -6,9 +6,6 @@ use keydance::cli::{self, Cli};
 fn main() -> ExitCode {
     match Cli::parse().run() {
         Ok(code) => code,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            cli::exit_code(&error)
-        }
+        Err(error) => cli::report(&error),
     }
 }

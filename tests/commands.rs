@@ -199,3 +199,17 @@ fn timings_are_printed_as_a_line_of_text_or_json() {
         }
     }
 }
+
+#[test]
+fn output_that_is_read_no_further_ends_the_program_quietly() {
+    let (reader, closed) = std::io::pipe().unwrap();
+    drop(reader);
+    let clips = tempfile::tempdir().unwrap();
+    generated_data::write_clips(clips.path(), 3, 1);
+    let clip = clips.path().read_dir().unwrap().next().unwrap().unwrap();
+    let mut program = keydance();
+    program.args(["bvh", "inspect"]).arg(clip.path());
+    let output = program.stdout(closed).output().unwrap();
+    assert_eq!(stderr(&output), "");
+    assert_eq!(output.status.code(), Some(141));
+}

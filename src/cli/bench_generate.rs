@@ -1,5 +1,7 @@
 //! `keydance bench-generate`: how fast frames are generated on this machine.
 
+use std::io::Write as _;
+
 use clap::Args;
 
 use crate::models::ModelConfig;
@@ -39,6 +41,7 @@ pub fn run(args: BenchGenerateArgs) -> anyhow::Result<()> {
     }
     let ms_per_frame = seconds * 1e3 / FRAMES as f64;
     let frames_per_second = (FRAMES * batch) as f64 / seconds;
+    let mut out = std::io::stdout();
     if args.json {
         let result = serde_json::json!({
             "batch": batch,
@@ -46,11 +49,12 @@ pub fn run(args: BenchGenerateArgs) -> anyhow::Result<()> {
             "ms_per_frame": ms_per_frame,
             "frames_per_second": frames_per_second,
         });
-        println!("{result}");
+        writeln!(out, "{result}")?;
     } else {
-        println!(
+        writeln!(
+            out,
             "generation, {batch} at once, {threads} threads: {ms_per_frame:.2} ms a frame, {frames_per_second:.0} frames/s"
-        );
+        )?;
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! `keydance bench-layers`: how fast an LSTM and two Transformer encoder layers are on this machine.
 
+use std::io::Write as _;
+
 use clap::Args;
 
 use crate::nn::measure::{Measured, MeasuredLayers};
@@ -34,18 +36,20 @@ pub fn run(args: BenchLayersArgs) -> anyhow::Result<()> {
     };
     let lstm = milliseconds(Measured::Lstm)?;
     let encoder = milliseconds(Measured::EncoderLayers)?;
+    let mut out = std::io::stdout();
     if args.json {
         let result = serde_json::json!({
             "threads": args.threads,
             "lstm_ms": lstm,
             "encoder_layers_ms": encoder,
         });
-        println!("{result}");
+        writeln!(out, "{result}")?;
     } else {
-        println!(
+        writeln!(
+            out,
             "{} threads: LSTM 1024 -> 256 and linear, 128 x 30: {lstm:.1} ms; two encoder layers, 128 windows of 7: {encoder:.1} ms",
             args.threads
-        );
+        )?;
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! `keydance bench-step`: how fast a training step is on this machine.
 
+use std::io::Write as _;
+
 use clap::Args;
 
 use crate::training::{ExperimentConfig, measure::step_speed};
@@ -42,13 +44,15 @@ pub fn run(args: BenchStepArgs) -> anyhow::Result<()> {
         args.threads.into(),
         args.repetitions.into(),
     )?;
+    let mut out = std::io::stdout();
     if args.json {
-        println!("{}", serde_json::to_string(&speed)?);
+        writeln!(out, "{}", serde_json::to_string(&speed)?)?;
     } else {
-        println!(
+        writeln!(
+            out,
             "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
             speed.batch, speed.frames, speed.threads, speed.seconds, speed.frame_steps_per_second
-        );
+        )?;
     }
     Ok(())
 }

@@ -25,6 +25,7 @@ mod train;
 mod viewer_page;
 mod watched;
 
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -34,6 +35,8 @@ use crate::training::TrainingError;
 
 /// Exit code of a training that ended because a loss or gradient was not finite.
 const DIVERGED: u8 = 3;
+/// Exit code where what read the output no longer does: that of a program which SIGPIPE ends.
+const OUTPUT_CLOSED: u8 = 141;
 
 /// Dance synthesis from keyframes.
 #[derive(Debug, Parser)]
@@ -104,10 +107,23 @@ impl Cli {
     }
 }
 
-/// The exit code of an error.
-pub fn exit_code(error: &anyhow::Error) -> ExitCode {
+/// Says what went wrong; the exit code of it.
+pub fn report(error: &anyhow::Error) -> ExitCode {
+    if output_is_closed(error) {
+        return ExitCode::from(OUTPUT_CLOSED);
+    }
+    // Where nobody reads this either there is nobody left to tell.
+    let _ = writeln!(io::stderr(), "error: {error:#}");
     match error.downcast_ref() {
         Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
         _ => ExitCode::FAILURE,
     }
+}
+
+/// Whether the error is that what reads the output, such as `head`, has seen enough of it.
+fn output_is_closed(error: &anyhow::Error) -> bool {
+    let causes = error.chain().filter_map(|cause| cause.downcast_ref());
+    causes
+        .map(io::Error::kind)
+        .any(|kind| kind == io::ErrorKind::BrokenPipe)
 }
