@@ -14,6 +14,8 @@
 //! - [`report`] - figures of losses, scores and dancers.
 //! - [`cli`] - the subcommands of the binary.
 #![deny(unsafe_code)]
+// They panic where the output is closed: writeln! with its error to stdout, cli::notice to stderr.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod autograd;
 pub mod cli;

@@ -189,6 +189,21 @@ fn ctrl_c_ends_the_step_saves_and_says_how_to_go_on() {
 }
 
 #[test]
+fn a_training_whose_messages_nobody_reads_goes_on_to_the_same_bits() {
+    let small = SmallRun::new();
+    let read = small.train(&small.path("read"), &[]);
+    let (reader, closed) = std::io::pipe().unwrap();
+    drop(reader);
+    let unread = keydance()
+        .args(small.train_arguments(&small.path("unread"), &[]))
+        .stderr(closed)
+        .output()
+        .unwrap();
+    assert!(stderr(&read).contains("step 1/"), "{}", stderr(&read));
+    assert_eq!(digest(&unread), digest(&read));
+}
+
+#[test]
 fn a_killed_run_is_listed_as_interrupted_and_goes_on() {
     let (_folder, run) = STOPPED.copied();
     STOPPED.goes_on(&run);

@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::clip_choice::ClipChoice;
 use super::evaluation_record::{EvaluatedData, EvaluationRecord};
+use super::notice::notice;
 use super::subject::Subject;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
@@ -74,7 +75,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         .pool()?
         .install(|| evaluate_watched(&args.protocol(), subject.model.as_ref(), clips))?;
     for skipped in &outcome.skipped {
-        eprintln!("warning: {skipped}");
+        notice(format_args!("warning: {skipped}"));
     }
     let row = TableRow {
         name: subject.config.name.clone(),

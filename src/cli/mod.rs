@@ -14,6 +14,7 @@ mod features;
 mod figures;
 mod generate;
 mod gradcheck;
+mod notice;
 mod progress;
 mod reproduce;
 mod runs;
@@ -25,11 +26,12 @@ mod train;
 mod viewer_page;
 mod watched;
 
-use std::io::{self, Write as _};
+use std::io;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use self::notice::notice;
 use crate::autograd::kernels::Isa;
 use crate::training::TrainingError;
 
@@ -112,8 +114,7 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
     if output_is_closed(error) {
         return ExitCode::from(OUTPUT_CLOSED);
     }
-    // Where nobody reads this either there is nobody left to tell.
-    let _ = writeln!(io::stderr(), "error: {error:#}");
+    notice(format_args!("error: {error:#}"));
     match error.downcast_ref() {
         Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
         _ => ExitCode::FAILURE,

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
+use super::notice::notice;
 use crate::training::{Schedule, StepReport};
 
 /// Time between two lines where there is no terminal for a progress bar.
@@ -74,7 +75,7 @@ impl Progress {
         }
         if self.line.is_none_or(|last| last.elapsed() >= LINE_EVERY) || report.step == self.steps {
             self.line = Some(Instant::now());
-            eprintln!("{what}");
+            notice(what);
         }
     }
 

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context as _;
 
+use super::notice::notice;
+
 /// Exit code after Ctrl-C or SIGTERM, as shells have it.
 const INTERRUPTED: u8 = 130;
 
@@ -25,7 +27,7 @@ impl Stop {
             if flag.0.swap(true, Ordering::Relaxed) {
                 std::process::exit(INTERRUPTED.into());
             }
-            eprintln!("stopping after this step; once more to stop at once");
+            notice("stopping after this step; once more to stop at once");
         })
         .context("no handler for Ctrl-C")?;
         Ok(stop)

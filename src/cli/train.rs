@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::notice::notice;
 use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
@@ -60,8 +61,10 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         }
         Outcome::Stopped => {
             let (done, all) = (trainer.steps_done(), trainer.schedule().steps());
-            eprintln!("stopped and saved after step {done} of {all}; go on with");
-            eprintln!("  {}", resume_command(&args));
+            notice(format_args!(
+                "stopped and saved after step {done} of {all}; go on with\n  {}",
+                resume_command(&args)
+            ));
             Ok(interrupted())
         }
     }
@@ -100,7 +103,9 @@ pub fn resume(
     let run = RunFolder::resume(path, config)?;
     let resumed = trainer.resume(&run)?;
     for problem in &resumed.damaged {
-        eprintln!("warning: a newer checkpoint is left out: {problem}");
+        notice(format_args!(
+            "warning: a newer checkpoint is left out: {problem}"
+        ));
     }
     writeln!(std::io::stdout(), "goes on after step {}", resumed.steps)?;
     Ok(run)
@@ -118,9 +123,9 @@ pub fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
     )?;
     let skipped = schedule.skipped_lengths();
     if let (Some(first), Some(last)) = (skipped.first(), skipped.last()) {
-        eprintln!(
+        notice(format_args!(
             "warning: no training clip is long enough for transitions of {first} to {last} frames: skipped"
-        );
+        ));
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ use clap::Args;
 
 use super::clip_choice::ClipChoice;
 use super::evaluation_record::{EvaluatedData, EvaluationRecord, write_json};
+use super::notice::notice;
 use super::tables::{schedule_note, thousands};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
@@ -167,8 +168,8 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     if comparison.is_ahead() {
         Ok(ExitCode::SUCCESS)
     } else {
-        eprintln!(
-            "error: the trained model is not ahead of interpolation and of its own beginning at long transitions"
+        notice(
+            "error: the trained model is not ahead of interpolation and of its own beginning at long transitions",
         );
         Ok(ExitCode::from(BEHIND))
     }

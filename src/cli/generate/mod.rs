@@ -14,6 +14,7 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::evaluation_record::write_json;
+use super::notice::notice;
 use super::subject::Subject;
 use super::viewer_page::{Shown, viewer_page};
 use crate::models::interpolation::Interpolation;
@@ -70,7 +71,7 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let request = args.velocity.apply(request, &keyframes)?;
     warnings.extend(control_warnings(&request, subject.ranges.as_ref()));
     for warning in &warnings {
-        eprintln!("warning: {warning}");
+        notice(format_args!("warning: {warning}"));
     }
     let options = SynthesisOptions {
         foot_cleanup: args.foot_cleanup,

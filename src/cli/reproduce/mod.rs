@@ -17,6 +17,7 @@ use self::report::Reported;
 use self::results::RowResults;
 use self::rows::{Row, Seeds};
 use super::clip_choice::ClipChoice;
+use super::notice::notice;
 use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
@@ -131,7 +132,10 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         .unwrap_or_else(PoisonError::into_inner);
     workshop.report(&rows)?;
     if workshop.stop.is_asked() {
-        eprintln!("stopped and saved; go on with\n  {}", same_command());
+        notice(format_args!(
+            "stopped and saved; go on with\n  {}",
+            same_command()
+        ));
         return Ok(interrupted());
     }
     if let Some(error) = diverged {
@@ -172,7 +176,7 @@ impl Line<'_> {
                 match outcome {
                     RowOutcome::Done => self.workshop.report(self.rows)?,
                     RowOutcome::Diverged(error) => {
-                        eprintln!("error: {}: {error}", row.folder);
+                        notice(format_args!("error: {}: {error}", row.folder));
                         *diverged = Some(error);
                     }
                     RowOutcome::Left => {}
@@ -332,7 +336,7 @@ impl Workshop<'_> {
             false => protocol.evaluate(model, clips),
         })?;
         for skipped in &outcome.skipped {
-            eprintln!("warning: {skipped}");
+            notice(format_args!("warning: {skipped}"));
         }
         Ok(outcome.evaluation)
     }
