@@ -28,30 +28,15 @@ impl Augmentation {
         config: &ExperimentConfig,
     ) -> Result<(Self, Vec<TrainingClip<'d>>), TrainingError> {
         let augmentation = &config.augmentation;
-        let made =
-            |clips: &[DanceClip],
-             make: &(dyn Fn(&DanceClip) -> Result<DanceClip, DataError> + Sync)| {
-                let made: Result<Vec<_>, _> = clips
-                    .par_iter()
-                    .map(|clip| make(clip).map_err(Box::new))
-                    .collect();
-                made
-            };
-        let image = |clip: &DanceClip| clip.mirror_image(&config.data);
+        let images = |clips: &[DanceClip]| match augmentation.mirror {
+            true => of_each(clips, |clip| clip.mirror_image(&config.data)),
+            false => Ok(Vec::new()),
+        };
         let mut clips: Vec<_> = recorded.iter().map(TrainingClip::of).collect();
-        if augmentation.mirror {
-            clips.extend(
-                made(recorded, &image)?
-                    .into_iter()
-                    .map(TrainingClip::owning),
-            );
-        }
+        clips.extend(images(recorded)?.into_iter().map(TrainingClip::owning));
         for &tempo in &augmentation.tempi {
-            let changed = made(recorded, &|clip| clip.at_tempo(tempo, &config.data))?;
-            let images = match augmentation.mirror {
-                true => made(&changed, &image)?,
-                false => Vec::new(),
-            };
+            let changed = of_each(recorded, |clip| clip.at_tempo(tempo, &config.data))?;
+            let images = images(&changed)?;
             clips.extend(changed.into_iter().chain(images).map(TrainingClip::owning));
         }
         let forms = Self {
@@ -109,4 +94,12 @@ impl Augmentation {
             None => window,
         }
     }
+}
+
+fn of_each(
+    clips: &[DanceClip],
+    make: impl Fn(&DanceClip) -> Result<DanceClip, DataError> + Sync,
+) -> Result<Vec<DanceClip>, Box<DataError>> {
+    let made = clips.par_iter().map(|clip| make(clip).map_err(Box::new));
+    made.collect()
 }
