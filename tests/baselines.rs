@@ -179,7 +179,7 @@ fn their_configs_are_evaluated_through_the_binary_and_are_not_trained() {
     };
     let mut lrp = Vec::new();
     for name in ["zero_velocity", "linear_positions"] {
-        let config = format!("experiments/paper/{name}.toml");
+        let config = format!("experiments/pan2021/{name}.toml");
         let out = folder.path().join(name);
         keydance("evaluate", &config)
             .arg("--out")

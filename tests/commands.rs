@@ -24,7 +24,7 @@ fn stdout(output: &Output) -> String {
 /// A config of the paper's.
 fn paper(name: &str) -> String {
     format!(
-        "{}/experiments/paper/{name}.toml",
+        "{}/experiments/pan2021/{name}.toml",
         env!("CARGO_MANIFEST_DIR")
     )
 }

@@ -604,7 +604,7 @@ fn the_papers_config_trains_and_is_evaluated_through_the_binary() {
     let path = |name: &str| folder.path().join(name);
     fs::create_dir(path("data")).unwrap();
     write_clips(&path("data"), 180, 3);
-    let config = "experiments/paper/harvey.toml";
+    let config = "experiments/pan2021/harvey.toml";
     let mut train = keydance(
         &["train", config],
         [("--data", &path("data")), ("--out", &path("run"))],
@@ -650,7 +650,7 @@ fn settings_that_do_not_fit_are_refused_by_name() {
     ] {
         Command::cargo_bin("keydance")
             .unwrap()
-            .args(["gradcheck", "experiments/paper/harvey.toml", "--full-size"])
+            .args(["gradcheck", "experiments/pan2021/harvey.toml", "--full-size"])
             .args(["--set", set])
             .assert()
             .failure()

@@ -562,7 +562,7 @@ fn clips_shorter_than_every_window_are_an_error_that_says_what_to_do() {
 
 #[test]
 fn the_papers_configs_load_and_differ_from_the_whole_model_by_their_name_and_one_field() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/paper");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/pan2021");
     let load = |name: &str| ExperimentConfig::load(&folder.join(name), &[]).unwrap();
     let whole = load("whole_model.toml");
     assert_eq!(whole, ExperimentConfig::default());
@@ -599,8 +599,8 @@ fn the_papers_configs_load_and_differ_from_the_whole_model_by_their_name_and_one
 #[test]
 fn the_budget_goes_over_every_config_of_the_paper_and_leaves_its_model() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
-    let budget = folder.join("budget/two_cores.toml");
-    for file in fs::read_dir(folder.join("paper")).unwrap() {
+    let budget = folder.join("budgets/pan2021.toml");
+    for file in fs::read_dir(folder.join("pan2021")).unwrap() {
         let file = file.unwrap().path();
         let plain = ExperimentConfig::load(&file, &[]).unwrap();
         let config = ExperimentConfig::load_under(&file, Some(&budget), &[]).unwrap();

@@ -21,7 +21,7 @@ const TRANSITIONS: [usize; 2] = [12, 6];
 
 #[derive(Debug, Args)]
 pub struct GradcheckArgs {
-    /// Experiment whose model is checked, such as experiments/paper/one_lstm.toml; without one, the whole model
+    /// Experiment whose model is checked, such as experiments/pan2021/one_lstm.toml; without one, the whole model
     config: Option<PathBuf>,
     /// Override a value of the config, such as model.loss.key=0
     #[arg(long, value_name = "KEY=VALUE", requires = "config")]

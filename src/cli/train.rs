@@ -24,7 +24,7 @@ pub struct TrainArgs {
     /// Folder for the run: config, manifest, log, checkpoints, weights
     #[arg(long, value_name = "RUN_DIR")]
     out: PathBuf,
-    /// Config of overrides over the experiment's, such as experiments/budget/two_cores.toml
+    /// Config of overrides over the experiment's, such as experiments/budgets/pan2021.toml
     #[arg(long, value_name = "FILE")]
     budget: Option<PathBuf>,
     /// Override a key of the config, such as schedule.fraction=0.005; may be repeated

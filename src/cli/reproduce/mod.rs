@@ -35,7 +35,7 @@ use crate::training::{Outcome, RunFolder, RunState, Trainer, TrainingError};
 /// is the same to the bit as without the break. Tables are written again after every row; rows that are missing show "—".
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
-    /// Folder of configs, such as experiments/paper
+    /// Folder of configs, such as experiments/pan2021
     #[arg(value_name = "CONFIGS")]
     configs: PathBuf,
     /// Folder of BVH files
@@ -47,7 +47,7 @@ pub struct ReproduceArgs {
     /// Folder for the runs, large: checkpoints, logs and weights [default: runs/ and the name of OUT]
     #[arg(long, value_name = "DIR")]
     runs: Option<PathBuf>,
-    /// Config of overrides for all rows alike, such as experiments/budget/two_cores.toml
+    /// Config of overrides for all rows alike, such as experiments/budgets/pan2021.toml
     #[arg(long, value_name = "FILE")]
     budget: Option<PathBuf>,
     /// Override a key of all configs, such as schedule.fraction=0.005; may be repeated

@@ -154,7 +154,7 @@ fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     }
     if files.is_empty() {
         bail!(
-            "{} holds no config (.toml); experiments/paper does",
+            "{} holds no config (.toml); experiments/pan2021 does",
             folder.display()
         );
     }
