@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use keydance::experiment::ExperimentConfig;
 use keydance::nn::measure::{Measured, MeasuredLayers};
-use keydance::training::ExperimentConfig;
 use keydance::training::measure::MeasuredStep;
 
 const BATCH: usize = 128;

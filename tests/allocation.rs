@@ -5,9 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
-use keydance::models::gradient_check::generated_windows;
 use keydance::models::pan2021::{Controllers, Pan2021, Pan2021Config};
-use keydance::models::{Batch, Feed, Network};
+use keydance::models::transition::gradient_check::generated_windows;
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::nn::Initialiser;
 use keydance::optim::{Adam, AdamConfig};
 use ndarray::s;

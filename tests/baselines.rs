@@ -9,11 +9,12 @@ use std::fs;
 use assert_cmd::Command;
 use generated_data::write_clips;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, window_features};
+use keydance::data::{DanceClip, DataConfig};
 use keydance::evaluation::{window_request, window_scores};
-use keydance::models::linear_positions::LinearPositions;
-use keydance::models::zero_velocity::ZeroVelocity;
-use keydance::models::{Transition, TransitionModel, TransitionRequest};
+use keydance::models::baselines::linear_positions::LinearPositions;
+use keydance::models::baselines::zero_velocity::ZeroVelocity;
+use keydance::models::transition::window_features;
+use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
 };

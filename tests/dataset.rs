@@ -10,9 +10,8 @@ use std::path::Path;
 
 use dance_clip::turning_clip;
 use glam::DVec3;
-use keydance::data::{
-    DanceClip, DataConfig, Dataset, Split, Standardisation, window_features, windows,
-};
+use keydance::data::{DanceClip, DataConfig, Dataset, Split};
+use keydance::models::transition::{Standardisation, window_features, windows};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING};
 use ndarray::{Array2, s};

@@ -501,7 +501,8 @@ fn interpolation_on_the_dance_data_has_the_known_scores() {
     };
     let out = TempDir::new().unwrap();
     let file = out.path().join("scores.json");
-    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/pan2021/interpolation.toml");
+    let config =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/pan2021/interpolation.toml");
     keydance("evaluate")
         .arg(config)
         .arg("--data")

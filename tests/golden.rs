@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
-use keydance::data::Standardisation;
 use keydance::models::pan2021::{Pan2021, Pan2021Config};
-use keydance::models::{Batch, Feed, Network};
+use keydance::models::transition::Standardisation;
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, ArrayD, Axis, IxDyn};
 use rand::SeedableRng;

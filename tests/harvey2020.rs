@@ -13,12 +13,15 @@ use generated_data::write_clips;
 use glam::{DQuat, DVec3};
 use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{Dataset, Split, Standardisation};
-use keydance::models::gradient_check::{
+use keydance::data::{Dataset, Split};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::ModelConfig;
+use keydance::models::harvey2020::{Harvey2020, Harvey2020Config};
+use keydance::models::transition::Standardisation;
+use keydance::models::transition::gradient_check::{
     GradientCase, GradientCheckConfig, check_model, generated_batch,
 };
-use keydance::models::harvey2020::{Harvey2020, Harvey2020Config};
-use keydance::models::{Batch, Feed, ModelConfig, Network, PoseWindows};
+use keydance::models::transition::{Batch, Feed, Network, PoseWindows};
 use keydance::motion::DANCE_PARENTS;
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
@@ -26,7 +29,8 @@ use keydance::motion::features::{
 use keydance::motion::placement::world_positions;
 use keydance::nn::Initialiser;
 use keydance::optim::{Adam, AdamConfig};
-use keydance::training::{ExperimentConfig, RunFolder, Trainer};
+use keydance::run::RunFolder;
+use keydance::training::Trainer;
 use ndarray::{Array2, Array3, Axis, s};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
@@ -650,7 +654,11 @@ fn settings_that_do_not_fit_are_refused_by_name() {
     ] {
         Command::cargo_bin("keydance")
             .unwrap()
-            .args(["gradcheck", "experiments/pan2021/harvey.toml", "--full-size"])
+            .args([
+                "gradcheck",
+                "experiments/pan2021/harvey.toml",
+                "--full-size",
+            ])
             .args(["--set", set])
             .assert()
             .failure()

@@ -14,14 +14,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use damage::{Damage, damage, damages};
 use keydance::autograd::Parameters;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, Standardisation};
+use keydance::data::{DanceClip, DataConfig};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::Streams;
+use keydance::models::transition::Standardisation;
 use keydance::models::weights::{SavedWeights, to_safetensors};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
 use keydance::nn::Initialiser;
-use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE};
-use keydance::training::state::{self, Header, Moments};
-use keydance::training::{ExperimentConfig, RunFolder, Streams};
+use keydance::run::RunFolder;
+use keydance::run::checkpoint::{STATE_FILE, WEIGHTS_FILE};
+use keydance::run::state::{self, Header, Moments};
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, TensorView};
 use sha2::{Digest, Sha256};
@@ -410,7 +413,7 @@ fn a_small_file_whose_config_names_a_huge_model_takes_no_memory() {
 
 #[test]
 fn a_checkpoint_larger_than_its_model_is_refused_unread() {
-    use keydance::training::checkpoint::Checkpoint;
+    use keydance::run::checkpoint::Checkpoint;
     let folder = tempfile::tempdir().unwrap();
     let state = fs::File::create(folder.path().join(STATE_FILE)).unwrap();
     // Takes no room on the disk.

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, Dataset};
 use keydance::evaluation::Protocol;
-use keydance::models::interpolation::Interpolation;
-use keydance::models::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
+use keydance::models::ModelError;
+use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::{KeyframePose, Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
 };

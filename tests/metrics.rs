@@ -8,8 +8,9 @@ use keydance::evaluation::metrics::{foot_skate, means};
 use keydance::evaluation::{
     Evaluation, EvaluationError, LengthScores, Protocol, WindowScores, window_scores,
 };
-use keydance::models::interpolation::Interpolation;
-use keydance::models::{ModelError, Transition, TransitionModel, TransitionRequest};
+use keydance::models::ModelError;
+use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{BODY_VELOCITIES, CONTACTS, FEATURES, FRAME, ROOT_POSITION};
 use keydance::motion::{
     Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, Joint, Pose, Skeleton, features,
@@ -149,7 +150,7 @@ fn predictions_that_do_not_fit_are_errors_that_name_both_shapes() {
 proptest! {
     #[test]
     fn a_perfect_prediction_has_no_error(clip in moving_clip(12)) {
-        let window = keydance::data::window_features(&clip.features, 0, 11);
+        let window = keydance::models::transition::window_features(&clip.features, 0, 11);
         let scores = window_scores(window.view(), &perfect(&window)).unwrap();
         prop_assert_eq!(scores.body_position, 0.0);
         prop_assert_eq!(scores.root, 0.0);
@@ -158,7 +159,7 @@ proptest! {
 
     #[test]
     fn errors_are_those_of_the_norms(shift in prop::array::uniform3(-50.0..50.0f64), clip in moving_clip(6)) {
-        let window = keydance::data::window_features(&clip.features, 0, 5);
+        let window = keydance::models::transition::window_features(&clip.features, 0, 5);
         let mut predicted = perfect(&window);
         for mut row in predicted.frames.rows_mut() {
             for (axis, by) in shift.iter().enumerate() {
@@ -242,7 +243,7 @@ impl TransitionModel for Oracle<'_> {
                 let start = (0..clip.features.nrows().checked_sub(length)?).find(|&start| {
                     roots.slice(s![start..=start + length, ..]) == request.root_trajectory
                 })?;
-                let mut transition = perfect(&keydance::data::window_features(
+                let mut transition = perfect(&keydance::models::transition::window_features(
                     &clip.features,
                     start,
                     length,

@@ -6,12 +6,13 @@ mod network;
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
-use keydance::data::Standardisation;
-use keydance::models::gradient_check::{
+use keydance::models::ModelConfig;
+use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
+use keydance::models::transition::Standardisation;
+use keydance::models::transition::gradient_check::{
     GradientCase, GradientCheckConfig, check_model, generated_windows,
 };
-use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
-use keydance::models::{Batch, Feed, ModelConfig, Network};
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, Axis, s};

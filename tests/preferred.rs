@@ -7,13 +7,14 @@ use std::collections::BTreeMap;
 
 use keydance::autograd::{Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, RootFrame, Standardisation, window_features};
+use keydance::data::{DanceClip, DataConfig};
 use keydance::evaluation::window_request;
-use keydance::models::gradient_check::generated_windows;
 use keydance::models::pan2021::Pan2021Config;
-use keydance::models::{
+use keydance::models::transition::gradient_check::generated_windows;
+use keydance::models::transition::{
     Batch, Feed, Network, SingleFrame, TrainedModel, Transition, TransitionModel, TransitionRequest,
 };
+use keydance::models::transition::{RootFrame, Standardisation, window_features};
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
 use network::{Built, build, predict, residual, with_control_path};

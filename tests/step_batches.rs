@@ -5,10 +5,13 @@ use std::sync::{Arc, Mutex};
 
 use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DataConfig, Dataset, Split, Standardisation};
-use keydance::models::{Batch, Feed, LossTerms, Network};
+use keydance::data::{DataConfig, Dataset, Split};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::LossTerms;
+use keydance::models::transition::Standardisation;
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::motion::features::{FRAME, ROOT_POSITION, ROOT_VELOCITY};
-use keydance::training::{ExperimentConfig, Trainer};
+use keydance::training::Trainer;
 use ndarray::{Array1, Array2, Array3, ArrayView2, Axis, s};
 
 /// A network with one weight that keeps what it was shown.

@@ -5,10 +5,12 @@ use std::sync::Mutex;
 
 use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, DataRanges, window_features};
+use keydance::data::{DanceClip, DataConfig};
 use keydance::evaluation::window_request;
-use keydance::models::interpolation::Interpolation;
-use keydance::models::{ModelError, Transition, TransitionModel, TransitionRequest};
+use keydance::models::ModelError;
+use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::{DataRanges, window_features};
+use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };

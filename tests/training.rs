@@ -8,14 +8,15 @@ use std::path::{Path, PathBuf};
 
 use common::training::{config, dataset, trainer, trainer_of};
 use keydance::autograd::{AutogradError, BlockId, Tape};
+use keydance::experiment::ExperimentConfig;
 use keydance::models::pan2021::{Controllers, Pan2021Config};
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::models::weights::SavedWeights;
-use keydance::models::{Batch, Feed, LossTerms, ModelConfig, Network};
-use keydance::training::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
-use keydance::training::state::decode;
-use keydance::training::{
-    ExperimentConfig, Outcome, RunFolder, RunState, StepReport, Trainer, TrainingError,
-};
+use keydance::models::{LossTerms, ModelConfig};
+use keydance::run::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
+use keydance::run::state::decode;
+use keydance::run::{RunFolder, RunState};
+use keydance::training::{Outcome, StepReport, Trainer, TrainingError};
 use ndarray::Array3;
 use sha2::{Digest, Sha256};
 
@@ -115,7 +116,7 @@ fn both_feeds_are_drawn_and_the_loss_falls() {
     assert!(feeds(|beta| beta > 0.5) > 5 && feeds(|beta| beta < 0.5) > 5);
     let predicted = reports
         .iter()
-        .filter(|r| r.feed == keydance::models::Feed::Predictions);
+        .filter(|r| r.feed == keydance::models::transition::Feed::Predictions);
     assert!((5..reports.len() - 5).contains(&predicted.count()));
     let mean = |reports: &[StepReport]| {
         reports.iter().map(|r| r.total).sum::<f64>() / reports.len() as f64

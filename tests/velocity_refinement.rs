@@ -2,10 +2,11 @@
 
 use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, window_features};
+use keydance::data::{DanceClip, DataConfig};
 use keydance::evaluation::window_request;
-use keydance::models::TransitionRequest;
-use keydance::models::velocity_refinement;
+use keydance::models::transition::TransitionRequest;
+use keydance::models::transition::velocity_refinement;
+use keydance::models::transition::window_features;
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };

@@ -9,10 +9,11 @@ use std::fs;
 
 use glam::DVec3;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig, window_features};
+use keydance::data::{DanceClip, DataConfig};
 use keydance::evaluation::window_request;
-use keydance::models::TransitionModel;
-use keydance::models::interpolation::Interpolation;
+use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::TransitionModel;
+use keydance::models::transition::window_features;
 use keydance::motion::placement::world_positions;
 use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use ndarray::{Axis, concatenate, s};

@@ -4,14 +4,15 @@ use std::fs;
 use std::path::Path;
 
 use keydance::autograd::Parameters;
-use keydance::data::Standardisation;
+use keydance::models::transition::Standardisation;
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::models::weights::to_safetensors;
 use keydance::motion::DANCE_JOINTS;
 use keydance::motion::bvh::{Axis, Bvh, channel_layout};
 use keydance::nn::Initialiser;
-use keydance::training::state::{Header, Moments};
-use keydance::training::{ExperimentConfig, Streams};
+use keydance::run::state::{Header, Moments};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::Streams;
 
 const BVH: &str = "HIERARCHY
 ROOT Hips

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use keydance::training::ExperimentConfig;
+use keydance::experiment::ExperimentConfig;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use keydance::training::state::decode;
+use keydance::run::state::decode;
 use libfuzzer_sys::fuzz_target;
 use sha2::{Digest, Sha256};
 

@@ -6,7 +6,8 @@ use std::path::Path;
 use keydance::autograd::Parameters;
 use keydance::models::weights::SavedWeights;
 use keydance::nn::Initialiser;
-use keydance::training::{ExperimentConfig, Streams};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::Streams;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

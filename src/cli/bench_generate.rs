@@ -5,7 +5,7 @@ use std::io::Write as _;
 use clap::Args;
 
 use crate::models::ModelConfig;
-use crate::models::measure::MeasuredGeneration;
+use crate::models::transition::measure::MeasuredGeneration;
 
 /// Frames of the generated transitions.
 const FRAMES: usize = 60;

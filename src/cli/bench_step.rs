@@ -4,7 +4,8 @@ use std::io::Write as _;
 
 use clap::Args;
 
-use crate::training::{ExperimentConfig, measure::step_speed};
+use crate::experiment::ExperimentConfig;
+use crate::training::measure::step_speed;
 
 /// What is timed.
 #[derive(Debug, Args)]

@@ -15,7 +15,7 @@ use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::Dataset;
 use crate::evaluation::{Protocol, TableRow, terminal_tables};
-use crate::training::{RunFolder, replace_file};
+use crate::run::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::clip_choice::ClipChoice;
 use crate::data::{DanceClip, Dataset};
 use crate::evaluation::Evaluation;
-use crate::training::replace_file;
+use crate::run::replace_file;
 
 /// What a model was evaluated on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -10,9 +10,10 @@ use ndarray::{Array3, Axis};
 use safetensors::tensor::{Dtype, TensorView};
 
 use crate::autograd::{Gradients, Tape, Workspace};
-use crate::data::{Dataset, RootFrame, Standardisation, windows};
-use crate::models::{Batch, Feed, PoseWindows};
-use crate::training::{RunFolder, replace_file};
+use crate::data::Dataset;
+use crate::models::transition::{Batch, Feed, PoseWindows};
+use crate::models::transition::{RootFrame, Standardisation, windows};
+use crate::run::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
 pub struct ExportBatchArgs {

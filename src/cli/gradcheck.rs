@@ -8,9 +8,9 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::autograd::check::{CheckReport, ParameterReport};
-use crate::models::Feed;
-use crate::models::gradient_check::{GradientCase, GradientCheckConfig, check_model};
-use crate::training::ExperimentConfig;
+use crate::experiment::ExperimentConfig;
+use crate::models::transition::Feed;
+use crate::models::transition::gradient_check::{GradientCase, GradientCheckConfig, check_model};
 
 /// Largest error that passes.
 const TOLERANCE: f64 = 1e-5;

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::notice::notice;
-use crate::training::{Schedule, StepReport};
+use crate::models::transition::Schedule;
+use crate::training::StepReport;
 
 /// Time between two lines where there is no terminal for a progress bar.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -9,7 +9,9 @@ use clap::Args;
 
 use super::evaluation_record::EvaluationRecord;
 use super::tables::thousands;
-use crate::training::{ExperimentConfig, RunFolder, RunProgress, RunStatus, TrainingError};
+use crate::experiment::ExperimentConfig;
+use crate::run::{RunFolder, RunProgress, RunStatus};
+use crate::training::TrainingError;
 
 /// Folders inside folders that are looked through for runs.
 const DEEPEST: usize = 4;

@@ -4,9 +4,12 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use crate::data::{DataRanges, Dataset};
-use crate::models::{ModelConfig, TransitionModel};
-use crate::training::{ExperimentConfig, RunFolder};
+use crate::data::Dataset;
+use crate::experiment::ExperimentConfig;
+use crate::models::ModelConfig;
+use crate::models::transition::DataRanges;
+use crate::models::transition::TransitionModel;
+use crate::run::RunFolder;
 
 pub struct Subject {
     pub config: ExperimentConfig,

@@ -7,8 +7,9 @@ use clap::Args;
 
 use super::evaluation_record::{EvaluatedData, EvaluationRecord};
 use crate::evaluation::{TableRow, markdown_tables};
+use crate::experiment::ExperimentConfig;
 use crate::optim::{AdamConfig, RateShape};
-use crate::training::{ExperimentConfig, Manifest, RunFolder, RunState, replace_file};
+use crate::run::{Manifest, RunFolder, RunState, replace_file};
 
 #[derive(Debug, Args)]
 pub struct TablesArgs {

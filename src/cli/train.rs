@@ -12,7 +12,9 @@ use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use crate::data::Dataset;
-use crate::training::{ExperimentConfig, Outcome, RunFolder, Trainer, TrainingError};
+use crate::experiment::ExperimentConfig;
+use crate::run::RunFolder;
+use crate::training::{Outcome, Trainer, TrainingError};
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {

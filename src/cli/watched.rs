@@ -4,9 +4,11 @@ use std::io::IsTerminal as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::data::{DanceClip, windows};
+use crate::data::DanceClip;
 use crate::evaluation::{EvaluationError, Outcome, Protocol};
-use crate::models::{ModelError, Transition, TransitionModel, TransitionRequest};
+use crate::models::ModelError;
+use crate::models::transition::windows;
+use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 
 /// Evaluates a model and shows on stderr, where that is a terminal, how far it got.
 ///

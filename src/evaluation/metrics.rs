@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use ndarray::{ArrayView2, s};
 
-use crate::models::{ModelError, Transition};
+use crate::models::ModelError;
+use crate::models::transition::Transition;
 use crate::motion::contact::{FOOT_JOINTS, in_contact};
 use crate::motion::features::{BODY_POSITIONS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::placement::world_positions;

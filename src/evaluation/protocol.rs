@@ -8,8 +8,10 @@ use rayon::prelude::*;
 use super::metrics::{WindowScores, foot_skate, means, window_scores};
 use super::scores::{Evaluation, LengthScores};
 use super::window_request::window_request;
-use crate::data::{DanceClip, Window, window_features, windows};
-use crate::models::{ModelError, TransitionModel};
+use crate::data::DanceClip;
+use crate::models::ModelError;
+use crate::models::transition::TransitionModel;
+use crate::models::transition::{Window, window_features, windows};
 
 /// The protocol behind tables 2 to 4. The default is the paper's; scores of other lengths or thresholds are not comparable with it.
 ///

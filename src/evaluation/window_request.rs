@@ -2,7 +2,7 @@
 
 use ndarray::{ArrayView2, s};
 
-use crate::models::{KeyframePose, TransitionRequest};
+use crate::models::transition::{KeyframePose, TransitionRequest};
 use crate::motion::Clip;
 use crate::motion::features::{ROOT_POSITION, VELOCITY_FACTORS};
 

@@ -3,14 +3,15 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+use super::ModelError;
+use super::baselines::interpolation::Interpolation;
+use super::baselines::linear_positions::LinearPositions;
+use super::baselines::zero_velocity::ZeroVelocity;
 use super::harvey2020::{Harvey2020, Harvey2020Config};
-use super::interpolation::Interpolation;
-use super::linear_positions::LinearPositions;
 use super::pan2021::{Controllers, Pan2021, Pan2021Config};
-use super::zero_velocity::ZeroVelocity;
-use super::{ModelError, Network, TransitionModel};
+use super::transition::{Network, TransitionModel};
+use super::transition::{RootFrame, Standardisation};
 use crate::autograd::Real;
-use crate::data::{RootFrame, Standardisation};
 use crate::nn::Initialiser;
 
 /// The `[model]` table of an experiment's config; `kind` says which.

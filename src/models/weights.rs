@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
+use super::transition::Standardisation;
 use crate::autograd::Parameters;
-use crate::data::{Standardisation, hexadecimal};
+use crate::data::hexadecimal;
 use crate::motion::features::FEATURES;
 use crate::nn::MOST_WEIGHTS;
 

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
 
-use crate::data::window::wrap;
+use crate::models::transition::window::wrap;
 use crate::motion::Pose;
 
 /// Frames over which an offset decays.

@@ -1,6 +1,6 @@
 //! From predicted frames to a clip with joint rotations.
 
-use crate::models::{Transition, TransitionRequest};
+use crate::models::transition::{Transition, TransitionRequest};
 use crate::motion::Clip;
 use crate::motion::fit::{RotationFitError, fit_rotations};
 use crate::motion::placement::world_positions;

@@ -6,8 +6,8 @@ use super::SynthesisError;
 use super::controls::{rows_of, timed_curve};
 use super::retarget::{bones_of, retarget, with_constant_bones};
 use crate::data::DanceClip;
-use crate::data::window::wrap;
-use crate::models::{KeyframePose, TransitionRequest};
+use crate::models::transition::window::wrap;
+use crate::models::transition::{KeyframePose, TransitionRequest};
 use crate::motion::features::{BODY_VELOCITIES, FACING, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::{PARTS, Skeleton};
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::SynthesisError;
-use crate::models::KeyframePose;
+use crate::models::transition::KeyframePose;
 use crate::motion::features::{ROOT_POSITION, write_positions};
 use crate::motion::fit::fit_rotations;
 use crate::motion::{Pose, Skeleton};

@@ -8,7 +8,7 @@ use ndarray::{Array2, s};
 use super::blend::{Start, Track, blend};
 use super::foot_cleanup::pin_feet;
 use super::{SequenceRequest, SynthesisError};
-use crate::models::{KeyframePose, TransitionModel};
+use crate::models::transition::{KeyframePose, TransitionModel};
 use crate::motion::contact::{foot_skate, in_contact};
 use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,

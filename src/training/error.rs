@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::checkpoint::CheckpointError;
-use super::config_file::ConfigError;
-use super::durable::FileError;
-use super::state::StateError;
 use crate::autograd::AutogradError;
 use crate::data::DataError;
 use crate::evaluation::EvaluationError;
+use crate::experiment::layers::ConfigError;
 use crate::models::ModelError;
 use crate::models::weights::WeightsError;
+use crate::run::checkpoint::CheckpointError;
+use crate::run::durable::FileError;
+use crate::run::state::StateError;
 
 /// Why a training cannot begin, go on or be saved.
 #[derive(Debug, Error)]

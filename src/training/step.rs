@@ -9,13 +9,14 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Serialize, Serializer};
 
 use super::error::TrainingError;
-use super::schedule::parts;
-use super::single_frames::SingleFramePlan;
-use super::streams::Streams;
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
-use crate::data::{DanceClip, RootFrame, Standardisation, Window};
+use crate::data::DanceClip;
 use crate::evaluation::Evaluation;
-use crate::models::{Batch, Feed, Network, PoseWindows, SingleFrame};
+use crate::models::streams::Streams;
+use crate::models::transition::schedule::parts;
+use crate::models::transition::single_frames::SingleFramePlan;
+use crate::models::transition::{Batch, Feed, Network, PoseWindows, SingleFrame};
+use crate::models::transition::{RootFrame, Standardisation, Window};
 use crate::motion::Pose;
 use crate::motion::features::FEATURES;
 use crate::optim::Adam;
@@ -68,14 +69,14 @@ fn by_name<S: Serializer>(
 }
 
 /// What is trained, and how its windows become network input.
-pub(super) struct TrainingWindows<'d> {
+pub(crate) struct TrainingWindows<'d> {
     pub clips: Vec<TrainingClip<'d>>,
     pub standardisation: Standardisation,
     pub root_frame: RootFrame,
 }
 
 /// One of them.
-pub(super) struct TrainingClip<'d> {
+pub(crate) struct TrainingClip<'d> {
     /// `[frames, 154]`, not standardised.
     pub features: Cow<'d, Array2<f64>>,
     pub poses: Cow<'d, [Pose]>,
@@ -138,7 +139,7 @@ impl TrainingWindows<'_> {
 
 /// What a step trains.
 #[derive(Debug, Clone)]
-pub(super) struct StepPlan {
+pub(crate) struct StepPlan {
     /// N of the windows.
     pub length: usize,
     pub windows: Vec<Window>,
@@ -171,7 +172,7 @@ impl StepPlan {
 }
 
 /// What a step is given.
-pub(super) struct StepInput<'s> {
+pub(crate) struct StepInput<'s> {
     pub network: &'s dyn Network<f32>,
     pub windows: &'s TrainingWindows<'s>,
     pub streams: Streams,
@@ -184,13 +185,13 @@ pub(super) struct StepInput<'s> {
 
 /// Losses of a batch or of a shard of it.
 #[derive(Debug, Default)]
-pub(super) struct Losses {
+pub(crate) struct Losses {
     pub total: f64,
     pub terms: Vec<(&'static str, f64)>,
 }
 
 /// Threads and buffers that one step leaves for the next.
-pub(super) struct Stepper {
+pub(crate) struct Stepper {
     pool: ThreadPool,
     workspaces: Mutex<Vec<Workspace<f32>>>,
     /// One for each shard, zero between steps.

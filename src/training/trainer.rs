@@ -7,24 +7,26 @@ use std::time::Instant;
 
 use rand::RngExt as _;
 
-use super::augmentation::Augmentation;
-use super::checkpoint::{self, Checkpoint, CheckpointError};
-use super::config::ExperimentConfig;
-use super::config_file::ConfigError;
 use super::error::TrainingError;
-use super::log::Log;
-use super::manifest::{self, Manifest, RunState};
-use super::run_folder::RunFolder;
-use super::schedule::{BatchPlan, Schedule};
-use super::single_frames;
-use super::state::{self, Header};
 use super::step::{StepInput, StepPlan, StepReport, Stepper, TrainingWindows};
-use super::streams::Streams;
 use crate::autograd::Parameters;
-use crate::data::{DanceClip, Dataset, Standardisation};
-use crate::models::{Feed, ModelError, Network, TrainedModel, weights};
+use crate::data::{DanceClip, Dataset};
+use crate::experiment::config::ExperimentConfig;
+use crate::experiment::layers::ConfigError;
+use crate::models::streams::Streams;
+use crate::models::transition::Standardisation;
+use crate::models::transition::augmentation::Augmentation;
+use crate::models::transition::schedule::{BatchPlan, Schedule};
+use crate::models::transition::single_frames;
+use crate::models::transition::{Feed, Network, TrainedModel};
+use crate::models::{ModelError, weights};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
+use crate::run::checkpoint::{self, Checkpoint, CheckpointError};
+use crate::run::folder::RunFolder;
+use crate::run::log::Log;
+use crate::run::manifest::{self, Manifest, RunState};
+use crate::run::state::{self, Header};
 
 /// What draws a model's initial weights.
 pub type InitialRng = rand_chacha::ChaCha8Rng;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::TrainingError;
 use crate::data::{DanceClip, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
-use crate::models::TransitionModel;
+use crate::models::transition::TransitionModel;
 
 /// When a training scores itself on the clips that `data.validation_share` sets aside, and on how many windows.
 ///
@@ -37,7 +37,7 @@ impl ValidationConfig {
     ///
     /// # Errors
     /// No validation clips, or none with more frames than a length.
-    pub(super) fn check(&self, dataset: &Dataset) -> Result<(), TrainingError> {
+    pub(crate) fn check(&self, dataset: &Dataset) -> Result<(), TrainingError> {
         let frames = dataset.validation.iter().map(DanceClip::frames);
         let longest = frames.max().ok_or(TrainingError::NoValidationClips)?;
         match self.lengths.iter().find(|&&length| length >= longest) {
@@ -50,7 +50,7 @@ impl ValidationConfig {
     ///
     /// # Errors
     /// No validation clip is long enough for a length, or the model fails.
-    pub(super) fn score(
+    pub(crate) fn score(
         &self,
         model: &dyn TransitionModel,
         dataset: &Dataset,

@@ -1,9 +1,9 @@
 //! Networks of Pan et al. 2021 with their weights.
 
 use keydance::autograd::{Parameters, Real, Tape, Workspace};
-use keydance::data::Standardisation;
 use keydance::models::pan2021::{Output, Pan2021, Pan2021Config};
-use keydance::models::{Batch, Network};
+use keydance::models::transition::Standardisation;
+use keydance::models::transition::{Batch, Network};
 use keydance::nn::Initialiser;
 use ndarray::Array3;
 use rand::{RngExt, SeedableRng};

@@ -2,12 +2,14 @@
 
 use keydance::autograd::{AutogradError, BlockId, Parameters, Real, Tape};
 use keydance::data::{DanceClip, Dataset};
-use keydance::models::{Batch, Feed, LossTerms, Network};
+use keydance::experiment::ExperimentConfig;
+use keydance::models::LossTerms;
+use keydance::models::transition::{Batch, Feed, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::motion::{Clip, Skeleton};
 use keydance::nn::Initialiser;
 use keydance::optim::RateSchedule;
-use keydance::training::{ExperimentConfig, Trainer, TrainingError};
+use keydance::training::{Trainer, TrainingError};
 use ndarray::{Array2, Array3, Axis, s};
 
 const HIDDEN: usize = 8;
@@ -96,7 +98,7 @@ impl<T: Real> Network<T> for Recurrence {
 /// The network's parameters with this many hidden units.
 pub fn parameters(hidden: usize) -> Parameters<f32> {
     let mut parameters = Parameters::new();
-    let rng = keydance::training::Streams::new(9).initialisation();
+    let rng = keydance::models::Streams::new(9).initialisation();
     Recurrence::new(&mut Initialiser::new(&mut parameters, rng), hidden);
     parameters
 }

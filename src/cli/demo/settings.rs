@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 
 use crate::data::choreography::ChoreographyConfig;
-use crate::training::ExperimentConfig;
+use crate::experiment::ExperimentConfig;
 
 const EXPERIMENT: &str = include_str!("../../../experiments/demo.toml");
 

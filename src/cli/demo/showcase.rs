@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use ndarray::{Array2, s};
 
-use crate::data::{DanceClip, window_features};
+use crate::data::DanceClip;
 use crate::evaluation::window_request;
-use crate::models::{Transition, TransitionModel, TransitionRequest};
+use crate::models::transition::window_features;
+use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
@@ -16,8 +17,8 @@ use crate::report::{
     Asked, MotionFigure, MotionKind, MotionRow, Placing, Shown, Viewer, ViewerKeyframe,
     ViewerMotion,
 };
+use crate::run::replace_file;
 use crate::synthesis::{SynthesisedMotion, transition_motion};
-use crate::training::replace_file;
 
 /// N of the transition that is shown, frames.
 const LENGTH: usize = 100;

@@ -6,9 +6,11 @@ use std::ops::ControlFlow;
 use crate::cli::progress::Progress;
 use crate::cli::tables::thousands;
 use crate::data::Dataset;
-use crate::models::TrainedModel;
+use crate::experiment::ExperimentConfig;
+use crate::models::transition::TrainedModel;
 use crate::report::{FigureError, LossSeries, loss_curve};
-use crate::training::{ExperimentConfig, RunFolder, StepReport, Trainer};
+use crate::run::RunFolder;
+use crate::training::{StepReport, Trainer};
 
 /// What a training was and what it began with.
 pub struct Trained {

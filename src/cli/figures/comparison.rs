@@ -7,7 +7,7 @@ use super::root::{root_distances, row_with_paths};
 use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
 use crate::evaluation::{WindowScores, window_scores};
-use crate::models::Transition;
+use crate::models::transition::Transition;
 use crate::motion::placement::world_positions;
 use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
 use ndarray::s;

@@ -6,7 +6,7 @@ use super::stage::{Generated, Stage};
 use super::velocity::{asked_after, mean_parts};
 use super::wording::{mean, percent};
 use crate::evaluation::{FOLLOWED, mean_velocity_factors};
-use crate::models::TransitionModel;
+use crate::models::transition::TransitionModel;
 use crate::report::{MotionFigure, MotionRow, Shown};
 use ndarray::s;
 

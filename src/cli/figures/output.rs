@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::motion::{PART_NAMES, PARTS};
 use crate::report::MotionFigure;
-use crate::training::replace_file;
+use crate::run::replace_file;
 
 /// A figure and the numbers behind it.
 pub struct Figure {

@@ -6,7 +6,7 @@ use super::output::{Figure, Numbers};
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
 use crate::evaluation::{Protocol, Response, body_distance, root_response};
-use crate::models::TransitionModel;
+use crate::models::transition::TransitionModel;
 use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
 use crate::synthesis::{SequenceRequest, SynthesisError};

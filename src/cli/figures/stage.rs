@@ -5,8 +5,9 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
 use rayon::prelude::*;
 
-use crate::data::{DanceClip, window_features};
-use crate::models::{Transition, TransitionModel, TransitionRequest};
+use crate::data::DanceClip;
+use crate::models::transition::window_features;
+use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};

@@ -5,7 +5,7 @@ use super::root::mean_body_distance;
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
 use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
-use crate::models::TransitionModel;
+use crate::models::transition::TransitionModel;
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line};
 use crate::report::{MotionFigure, MotionRow, Shown};

@@ -25,8 +25,9 @@ use super::train;
 use super::watched::evaluate_watched;
 use crate::data::Dataset;
 use crate::evaluation::{Evaluation, Protocol};
-use crate::models::TransitionModel;
-use crate::training::{Outcome, RunFolder, RunState, Trainer, TrainingError};
+use crate::models::transition::TransitionModel;
+use crate::run::{RunFolder, RunState};
+use crate::training::{Outcome, Trainer, TrainingError};
 
 /// Trains every config of a folder that is not trained yet, evaluates it on the test clips and writes tables 2 to 4 with the paper's
 /// value, ours and the difference, figures and a manifest.
@@ -197,10 +198,12 @@ fn dataset(rows: &[Row], folder: &Path) -> anyhow::Result<Dataset> {
     let (first, others) = rows.split_first().context("there are no rows")?;
     for row in others {
         if row.config.data != first.config.data {
-            let differences = row.config.differences(&crate::training::ExperimentConfig {
-                data: first.config.data.clone(),
-                ..row.config.clone()
-            })?;
+            let differences = row
+                .config
+                .differences(&crate::experiment::ExperimentConfig {
+                    data: first.config.data.clone(),
+                    ..row.config.clone()
+                })?;
             bail!(
                 "rows of one table are on the same data, but {} and {} differ in {}",
                 row.folder,

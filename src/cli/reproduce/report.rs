@@ -15,7 +15,7 @@ use crate::data::hexadecimal;
 use crate::evaluation::paper::{self, PaperRow};
 use crate::evaluation::{TableRow, markdown_tables};
 use crate::report::{LrpSeries, lrp_curve};
-use crate::training::{RunFolder, replace_file};
+use crate::run::{RunFolder, replace_file};
 
 const TABLES: &str = "tables.md";
 const FIGURE: &str = "lrp.svg";

@@ -11,7 +11,7 @@ use crate::cli::tables::{NO_TRAINING, schedule_note, thousands};
 use crate::data::Dataset;
 use crate::evaluation::{Evaluation, TableRow};
 use crate::report::{LossSeries, ValidationSeries, loss_curve, validation_curve};
-use crate::training::{LogLine, Manifest, RunFolder, RunState, replace_file};
+use crate::run::{LogLine, Manifest, RunFolder, RunState, replace_file};
 
 const LOSS_CURVE: &str = "loss_curve.svg";
 const VALIDATION_CURVE: &str = "validation_curve.svg";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 
 use crate::evaluation::paper;
-use crate::training::ExperimentConfig;
+use crate::experiment::ExperimentConfig;
 
 /// A model, trained from one seed.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,9 +5,9 @@ use glam::{DQuat, DVec3};
 use ndarray::{Array1, Axis};
 
 use crate::autograd::{AutogradError, Real};
-use crate::data::Standardisation;
-use crate::models::Batch;
-use crate::models::pose_windows::{PoseWindows, ROTATIONS};
+use crate::models::transition::Batch;
+use crate::models::transition::Standardisation;
+use crate::models::transition::pose_windows::{PoseWindows, ROTATIONS};
 use crate::motion::features::{
     BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
 };

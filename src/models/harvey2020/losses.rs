@@ -5,7 +5,7 @@ use super::critic::{Critic, judge};
 use super::given::Given;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::LossTerms;
-use crate::models::pose_windows::{OFFSETS, ROTATIONS};
+use crate::models::transition::pose_windows::{OFFSETS, ROTATIONS};
 use crate::motion::{DANCE_PARENTS, JOINTS};
 
 /// The unit of differences of quaternions: from k1 on, they change by about this where joints move by s_p (the mean over windows of
@@ -123,7 +123,7 @@ fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &Given<'_, T>) -> Motion {
     }
 }
 
-/// All terms of a predicted motion; `total_windows` as in [`crate::models::Batch`].
+/// All terms of a predicted motion; `total_windows` as in [`crate::models::transition::Batch`].
 ///
 /// - quaternion: mean of |q~ - q| over the 96 numbers, in units of 0.07;
 /// - root: mean of |r~ - r| over the 3 numbers, in units of s_p;

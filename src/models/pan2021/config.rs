@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::RootFrame;
 use crate::models::ModelError;
+use crate::models::transition::RootFrame;
 use crate::nn::TransformerSizes;
 
 /// How a controller codes its segments.
@@ -82,7 +82,7 @@ pub struct Pan2021Config {
     /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
     pub single_frames: usize,
     /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper, see
-    /// [`crate::models::velocity_refinement`].
+    /// [`crate::models::transition::velocity_refinement`].
     pub velocity_refinement: bool,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,

@@ -7,7 +7,7 @@ use super::given::Given;
 use super::guess::{Estimator, estimate};
 use super::units::{NORM_EPS, Units};
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::models::Batch;
+use crate::models::transition::Batch;
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::nn::{Initialiser, LastLayer, Linear, Mlp};
 

@@ -7,7 +7,8 @@
 use super::config::Pan2021Config;
 use super::units::{Units, VELOCITIES, constant, lengths_of};
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::models::{Batch, LossTerms};
+use crate::models::LossTerms;
+use crate::models::transition::Batch;
 use crate::motion::JOINTS;
 use crate::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, FRAME, ROOT_POSITION,

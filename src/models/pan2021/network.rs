@@ -11,8 +11,9 @@ use super::guess::{self, Estimator};
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::data::Standardisation;
-use crate::models::{Batch, Feed, LossTerms, ModelError, Network};
+use crate::models::transition::Standardisation;
+use crate::models::transition::{Batch, Feed, Network};
+use crate::models::{LossTerms, ModelError};
 use crate::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };

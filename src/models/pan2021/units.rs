@@ -4,7 +4,7 @@ use glam::DVec3;
 use ndarray::Array2;
 
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::data::Standardisation;
+use crate::models::transition::Standardisation;
 use crate::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, ROOT_VELOCITY, VELOCITY_FACTORS,
 };

@@ -1,0 +1,540 @@
+//! Configs from files: small overrides on a base, overrides of the command line on top, unknown keys refused.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+use toml::{Table, Value};
+
+use super::config::{ExperimentConfig, ValueError};
+
+/// The key that names the file that a config overrides.
+const BASE: &str = "base";
+/// Largest config file that is read, bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+/// Most parts of a dotted key on the command line.
+const DEEPEST_KEY: usize = 16;
+/// Tables whose only key is a choice: one layer's choice replaces that of the layer below.
+const CHOICES: [&str; 1] = ["data.split"];
+
+/// Why there is no config.
+#[derive(Debug, Error)]
+pub enum ConfigError {
+    #[error("the config {path} cannot be read: {cause}")]
+    File {
+        path: PathBuf,
+        cause: std::io::Error,
+    },
+    #[error("the config {path} has more than {LARGEST_FILE} bytes")]
+    TooLarge { path: PathBuf },
+    #[error("the config {path} is not TOML: {cause}")]
+    Syntax {
+        path: PathBuf,
+        cause: Box<toml::de::Error>,
+    },
+    #[error("{origin}: unknown key {key}: remove it")]
+    UnknownKey { origin: String, key: String },
+    #[error("{origin}: {message}")]
+    Layer { origin: String, message: String },
+    #[error("{path} is its own base: {}", list(chain))]
+    Cycle { path: PathBuf, chain: Vec<PathBuf> },
+    #[error("--set {set}: {problem}; expected KEY=VALUE such as schedule.fraction=0.005")]
+    Set { set: String, problem: &'static str },
+    #[error("{origin}: {cause}")]
+    Value { origin: String, cause: ValueError },
+    #[error("the config cannot be written as TOML")]
+    Serialise(#[from] toml::ser::Error),
+}
+
+fn list(chain: &[PathBuf]) -> String {
+    let names: Vec<String> = chain
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    names.join(" -> ")
+}
+
+/// One cause of overrides, and what to call it in an error.
+struct Layer {
+    origin: String,
+    table: Table,
+}
+
+impl ExperimentConfig {
+    /// Reads a TOML file. A top-level key `base` names another file, relative to this one, that it overrides; keys that no file
+    /// names have the paper's values. `sets` are overrides `a.b.c=value` on top: a value is TOML, a bare word is a string.
+    ///
+    /// # Errors
+    /// A file cannot be read or is not TOML; a key is unknown or has a value of the wrong kind or range (the file or override
+    /// that says so is named); a file is its own base.
+    pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
+        Self::load_under(path, None, sets)
+    }
+
+    /// The same with a budget between the file and `sets`: a file of overrides that any experiment can be under.
+    ///
+    /// # Errors
+    /// As [`ExperimentConfig::load`].
+    pub fn load_under(
+        path: &Path,
+        budget: Option<&Path>,
+        sets: &[String],
+    ) -> Result<Self, ConfigError> {
+        let mut layers = Vec::new();
+        for file in [Some(path), budget].into_iter().flatten() {
+            read_layers(file, &mut Vec::new(), &mut layers)?;
+        }
+        for set in sets {
+            layers.push(set_layer(set)?);
+        }
+        resolve(&layers)
+    }
+
+    /// Reads a config from TOML text, without a base.
+    ///
+    /// # Errors
+    /// As [`ExperimentConfig::load`]; `origin` names the text in them.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
+        let table = parse_table(text, Path::new(origin))?;
+        resolve(&[Layer {
+            origin: origin.into(),
+            table,
+        }])
+    }
+
+    /// The config as TOML with every key, which reads back as the same config.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// The keys whose values differ: `key: value here, value there`.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    pub fn differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
+        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        flatten("", &Value::Table(Table::try_from(self)?), &mut ours);
+        flatten("", &Value::Table(Table::try_from(other)?), &mut theirs);
+        let mut keys: Vec<&String> = ours.iter().chain(&theirs).map(|(key, _)| key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let value = |side: &[(String, String)], key: &String| {
+            let found = side.iter().find(|(k, _)| k == key);
+            found.map_or("none".to_string(), |(_, value)| value.clone())
+        };
+        Ok(keys
+            .into_iter()
+            .map(|key| (key, value(&ours, key), value(&theirs, key)))
+            .filter(|(_, ours, theirs)| ours != theirs)
+            .map(|(key, ours, theirs)| format!("{key}: {ours}, {theirs}"))
+            .collect())
+    }
+
+    /// The differences that a training would notice: all but what begins after the network's prediction.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    pub fn training_differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
+        let refining = other.model.refines_velocities();
+        let same_after_prediction = Self {
+            model: self.model.clone().refining_velocities(refining),
+            ..self.clone()
+        };
+        same_after_prediction.differences(other)
+    }
+}
+
+fn flatten(key: &str, value: &Value, found: &mut Vec<(String, String)>) {
+    match value {
+        Value::Table(table) => {
+            for (name, value) in table {
+                flatten(&join(key, name), value, found);
+            }
+        }
+        _ => found.push((key.into(), value.to_string())),
+    }
+}
+
+fn join(key: &str, name: &str) -> String {
+    if key.is_empty() {
+        name.into()
+    } else {
+        format!("{key}.{name}")
+    }
+}
+
+fn parse_table(text: &str, path: &Path) -> Result<Table, ConfigError> {
+    text.parse().map_err(|cause| ConfigError::Syntax {
+        path: path.into(),
+        cause: Box::new(cause),
+    })
+}
+
+/// Adds the layers of a file to `layers`, its base's first. `above` are the files that rest on it.
+fn read_layers(
+    path: &Path,
+    above: &mut Vec<PathBuf>,
+    layers: &mut Vec<Layer>,
+) -> Result<(), ConfigError> {
+    let unreadable = |cause| ConfigError::File {
+        path: path.into(),
+        cause,
+    };
+    let canonical = path.canonicalize().map_err(unreadable)?;
+    if above.contains(&canonical) {
+        return Err(ConfigError::Cycle {
+            path: path.into(),
+            chain: above.iter().chain([&canonical]).cloned().collect(),
+        });
+    }
+    above.push(canonical);
+    if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_FILE {
+        return Err(ConfigError::TooLarge { path: path.into() });
+    }
+    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let origin = path.display().to_string();
+    let mut table = parse_table(&text, path)?;
+    match table.remove(BASE) {
+        None => {}
+        Some(Value::String(base)) => {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            read_layers(&folder.join(base), above, layers)?;
+        }
+        Some(other) => {
+            return Err(ConfigError::Layer {
+                origin,
+                message: format!("base = {other}: expected the name of a file in quotes"),
+            });
+        }
+    }
+    layers.push(Layer { origin, table });
+    Ok(())
+}
+
+fn set_layer(set: &str) -> Result<Layer, ConfigError> {
+    let bad = |problem| ConfigError::Set {
+        set: set.into(),
+        problem,
+    };
+    let (key, text) = set.split_once('=').ok_or_else(|| bad("has no '='"))?;
+    let parts: Vec<&str> = key.trim().split('.').collect();
+    if parts.len() > DEEPEST_KEY || parts.iter().any(|part| part.trim().is_empty()) {
+        return Err(bad("is not a dotted key"));
+    }
+    let text = text.trim();
+    let parsed = format!("value = {text}").parse::<Table>().ok();
+    let value = match parsed
+        .filter(|table| table.len() == 1)
+        .and_then(|mut t| t.remove("value"))
+    {
+        Some(value) => value,
+        None if text.starts_with(['[', '{', '"', '\'']) || text.contains(['\n', '\r']) => {
+            return Err(bad("has a value that is not TOML"));
+        }
+        None => Value::String(text.into()),
+    };
+    let value = parts.iter().rev().fold(value, |value, part| {
+        Value::Table(Table::from_iter([(part.trim().to_string(), value)]))
+    });
+    Ok(Layer {
+        origin: format!("--set {set}"),
+        table: match value {
+            Value::Table(table) => table,
+            _ => Table::new(),
+        },
+    })
+}
+
+/// Merges the layers onto the defaults and checks after each, so that an error names the layer that brought it.
+fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
+    let mut config = ExperimentConfig::default();
+    let mut table = Table::try_from(&config)?;
+    let mut last = "the defaults";
+    for Layer {
+        origin,
+        table: above,
+    } in layers
+    {
+        merge(&mut table, above, "");
+        config = table
+            .clone()
+            .try_into()
+            .map_err(|error: toml::de::Error| ConfigError::Layer {
+                origin: origin.clone(),
+                message: error.to_string().trim_end().replace('\n', " "),
+            })?;
+        // A model without fields takes any key without a word: what does not come back out was not understood.
+        if let Some(key) = missing(&table, &Table::try_from(&config)?, "") {
+            return Err(ConfigError::UnknownKey {
+                origin: origin.clone(),
+                key,
+            });
+        }
+        last = origin;
+    }
+    config.validate().map_err(|cause| ConfigError::Value {
+        origin: last.into(),
+        cause,
+    })?;
+    // A budget is over any model; what it says of a part that this one lacks makes no other experiment of it.
+    if !config.model.has_transformers() {
+        config.optimiser.transformer_learning_rate = None;
+    }
+    Ok(config)
+}
+
+fn merge(below: &mut Table, above: &Table, key: &str) {
+    // Fields of one kind of model mean nothing to another.
+    let kind = above.get("kind");
+    if kind.is_some() && kind != below.get("kind") {
+        below.clear();
+    }
+    for (name, value) in above {
+        let key = join(key, name);
+        match (below.get_mut(name), value) {
+            (Some(Value::Table(below)), Value::Table(above))
+                if !CHOICES.contains(&key.as_str()) =>
+            {
+                merge(below, above, &key);
+            }
+            _ => {
+                below.insert(name.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// The first key of `given` that `understood` lacks.
+fn missing(given: &Table, understood: &Table, key: &str) -> Option<String> {
+    given.iter().find_map(|(name, value)| {
+        let key = join(key, name);
+        match (value, understood.get(name)) {
+            (_, None) => Some(key),
+            (Value::Table(given), Some(Value::Table(understood))) => {
+                missing(given, understood, &key)
+            }
+            _ => None,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::data::Split;
+    use crate::experiment::layers::*;
+    use std::fs;
+
+    fn load(files: &[(&str, &str)], sets: &[&str]) -> Result<ExperimentConfig, String> {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        ExperimentConfig::load(&folder.path().join(files[0].0), &sets)
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn an_empty_config_is_the_papers() {
+        let config = load(&[("a.toml", "")], &[]).unwrap();
+        assert_eq!(config, ExperimentConfig::default());
+        assert_eq!(config.schedule.batch_size, 128);
+        assert_eq!(config.optimiser.learning_rate, 1e-4);
+        assert_eq!(config.scheduled_sampling.decay, 0.99995);
+    }
+
+    #[test]
+    fn a_file_overrides_its_base_and_the_command_line_overrides_both() {
+        let config = load(
+            &[
+                (
+                    "sub/a.toml",
+                    "base = '../b.toml'\nseed = 3\nschedule.max_len = 9",
+                ),
+                (
+                    "b.toml",
+                    "name = 'b'\nseed = 2\n[schedule]\nmax_len = 8\nshards = 2\nfraction = 1",
+                ),
+            ],
+            &["schedule.fraction=0.25", "name=c-1", "data.split.share=0.5"],
+        )
+        .unwrap();
+        assert_eq!((config.seed, config.name.as_str()), (3, "c-1"));
+        let schedule = &config.schedule;
+        assert_eq!(
+            (schedule.max_len, schedule.shards, schedule.fraction),
+            (9, 2, 0.25)
+        );
+        assert_eq!(config.data.split, Split::Share(0.5));
+    }
+
+    #[test]
+    fn a_budget_overrides_the_file_and_the_command_line_both() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            fs::write(&path, text).unwrap();
+            path
+        };
+        let config = file(
+            "a.toml",
+            "name = 'a'\nschedule.fraction = 1\nschedule.max_len = 9",
+        );
+        let budget = file("b.toml", "schedule = { fraction = 0.5, batch_size = 16 }");
+        let set = "schedule.batch_size=32".to_string();
+        let schedule = ExperimentConfig::load_under(&config, Some(&budget), &[set])
+            .unwrap()
+            .schedule;
+        assert_eq!(
+            (schedule.max_len, schedule.fraction, schedule.batch_size),
+            (9, 0.5, 32)
+        );
+    }
+
+    #[test]
+    fn what_a_budget_says_of_transformers_is_left_out_for_a_model_without_them() {
+        let rate = "optimiser.transformer_learning_rate=2e-4";
+        let of = |model: &str, sets: &[&str]| load(&[("a.toml", model)], sets).unwrap();
+        let whole = of("", &[rate]).optimiser;
+        assert_eq!(whole.transformer_learning_rate, Some(2e-4));
+        for model in [
+            "model.controllers = 'fully_connected'",
+            "model.kind = 'harvey2020'",
+        ] {
+            assert_eq!(of(model, &[rate]), of(model, &[]));
+        }
+        let text = load(
+            &[("a.toml", "")],
+            &["optimiser.transformer_learning_rate=0"],
+        );
+        let text = text.unwrap_err();
+        assert!(text.contains("= 0: expected a number above 0"), "{text}");
+    }
+
+    #[test]
+    fn the_resolved_config_reads_back_as_itself() {
+        let config = load(
+            &[("a.toml", "[data.split.list]\ntrain = ['a']\ntest = ['b']")],
+            &[],
+        );
+        let config = config.unwrap();
+        let text = config.to_toml().unwrap();
+        assert_eq!(ExperimentConfig::parse(&text, "text").unwrap(), config);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_file() {
+        let base = ("b.toml", "[schedule]\nmax_length = 3");
+        let text = load(&[("a.toml", "base = 'b.toml'"), base], &[]).unwrap_err();
+        assert!(
+            text.contains("b.toml") && text.contains("max_length"),
+            "{text}"
+        );
+        let text = load(&[("a.toml", "")], &["optimiser.momentum=1"]).unwrap_err();
+        assert!(
+            text.contains("--set optimiser.momentum=1") && text.contains("`momentum`"),
+            "{text}"
+        );
+        let text = load(
+            &[("a.toml", "[model]\nkind = 'interpolation'\nlayers = 2")],
+            &[],
+        );
+        let text = text.unwrap_err();
+        assert!(text.contains("a.toml") && text.contains("layers"), "{text}");
+    }
+
+    #[test]
+    fn a_base_that_rests_on_itself_is_an_error() {
+        let files = [("a.toml", "base = 'b.toml'"), ("b.toml", "base = 'a.toml'")];
+        let text = load(&files, &[]).unwrap_err();
+        assert!(
+            text.contains("a.toml -> ") && text.contains("b.toml"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_bad_value_names_key_and_remedy() {
+        for (set, words) in [
+            (
+                "schedule.fraction=0",
+                ["schedule.fraction = 0", "above 0 and at most 1"],
+            ),
+            (
+                "schedule.fraction=nan",
+                ["schedule.fraction = NaN", "above 0"],
+            ),
+            (
+                "schedule.shards=129",
+                ["schedule.shards = 129", "from 1 to 128"],
+            ),
+            ("schedule.max_len=4", ["schedule.max_len = 4", "from 5 to"]),
+            (
+                "optimiser.learning_rate=-1",
+                ["optimiser.learning_rate = -1", "above 0"],
+            ),
+            (
+                "optimiser.rate_schedule.final_share=1.5",
+                [
+                    "optimiser.rate_schedule.final_share = 1.5",
+                    "at least 0 and at most 1",
+                ],
+            ),
+            (
+                "optimiser.rate_schedule.shape=step",
+                ["--set optimiser.rate_schedule.shape=step", "cosine"],
+            ),
+            ("seed=-1", ["--set seed=-1", "-1"]),
+            ("seed", ["--set seed", "no '='"]),
+            ("a..b=1", ["--set a..b=1", "dotted key"]),
+            ("name=[1", ["--set name=[1", "not TOML"]),
+            ("name=../x", ["name = ../x", "letters"]),
+            ("schedule=3", ["--set schedule=3", "schedule"]),
+            (
+                "checkpoint.every_steps=0",
+                ["every_steps = 0", "at least 1"],
+            ),
+            ("checkpoint.keep=0", ["checkpoint.keep = 0", "from 1 to"]),
+            ("log.every_steps=0", ["log.every_steps = 0", "at least 1"]),
+            (
+                "scheduled_sampling.decay=1.5",
+                ["scheduled_sampling.decay = 1.5", "at most 1"],
+            ),
+            ("optimiser.beta1=1", ["optimiser.beta1 = 1", "below 1"]),
+            (
+                "optimiser.clip_norm=0",
+                ["optimiser.clip_norm = 0", "a number above 0"],
+            ),
+            (
+                "seed=9223372036854775808",
+                ["seed=9223372036854775808", "seed"],
+            ),
+            (
+                "validation={ every_steps = 0 }",
+                ["validation.every_steps = 0", "at least 1"],
+            ),
+            (
+                "validation={ every_steps = 9, lengths = [] }",
+                ["validation.lengths = []", "at least one length"],
+            ),
+        ] {
+            let text = load(&[("a.toml", "")], &[set]).unwrap_err();
+            assert!(
+                words.iter().all(|word| text.contains(word)),
+                "{set}: {text}"
+            );
+        }
+        let text = load(&[("a.toml", "seed = = 3")], &[]).unwrap_err();
+        assert!(text.contains("a.toml") && text.contains("line 1"), "{text}");
+    }
+
+    #[test]
+    fn differences_name_the_key_and_both_values() {
+        let other = load(&[("a.toml", "schedule.fraction = 0.5")], &[]).unwrap();
+        let found = ExperimentConfig::default().differences(&other).unwrap();
+        assert_eq!(found, ["schedule.fraction: 1.0, 0.5"]);
+    }
+}

@@ -1,0 +1,175 @@
+//! The gradient of a model's whole loss, end to end through time, against central differences in f64.
+
+use ndarray::{Array3, Axis};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+use super::network::CRITICS;
+use super::{Batch, Feed, PoseWindows, SingleFrame};
+use super::{Standardisation, window_features};
+use crate::autograd::check::{CheckReport, check_parameters};
+use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
+use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
+use crate::data::{DanceClip, DataConfig, DataError};
+use crate::models::{ModelConfig, ModelError};
+use crate::motion::features::FEATURES;
+use crate::nn::Initialiser;
+
+/// Frames of a generated clip beyond those of a window.
+const SPARE_FRAMES: usize = 120;
+/// Uniform noise on every weight, so that none stands at a special value such as 0.
+const NOISE: f64 = 0.1;
+/// Key of the dropout masks.
+const DROPOUT_KEY: u64 = 0x5eed;
+
+/// One way to compute a model's loss.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GradientCase {
+    /// N, frames from k1 to k2.
+    pub transition: usize,
+    pub feed: Feed,
+    /// Whether dropout acts, with the same masks at every evaluation.
+    pub dropout: bool,
+}
+
+/// How a gradient check is drawn and how much of it is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GradientCheckConfig {
+    /// Windows in the batch.
+    pub windows: usize,
+    /// Most numbers of each parameter that are compared.
+    pub per_parameter: usize,
+    /// Seed of motion and weights.
+    pub seed: u64,
+}
+
+/// Why a gradient could not be checked.
+#[derive(Debug, Error)]
+pub enum GradientCheckError {
+    #[error("a gradient check needs at least one frame and one window")]
+    Empty,
+    #[error(transparent)]
+    Choreography(#[from] ChoreographyError),
+    #[error(transparent)]
+    Data(#[from] DataError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Autograd(#[from] AutogradError),
+}
+
+/// Windows of generated dance, each from a clip of its own, with their poses, and the statistics of those clips.
+///
+/// # Errors
+/// No frames or no windows; more frames than can be generated.
+pub fn generated_batch(
+    transition: usize,
+    windows: usize,
+    seed: u64,
+) -> Result<(Batch<f64>, Standardisation), GradientCheckError> {
+    if transition == 0 || windows == 0 {
+        return Err(GradientCheckError::Empty);
+    }
+    let clips = generate(&ChoreographyConfig {
+        clips: windows,
+        frames_per_clip: transition.saturating_add(SPARE_FRAMES),
+        seed,
+    })?;
+    let clips = clips
+        .into_iter()
+        .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let standardisation = Standardisation::fit(clips.iter().map(|clip| clip.features.view()));
+    let mut features = Array3::zeros((transition + 1, windows, FEATURES));
+    let mut poses = PoseWindows::zeros(transition + 1, windows);
+    let start = SPARE_FRAMES / 2;
+    for (window, clip) in clips.iter().enumerate() {
+        let cut = window_features(&clip.features, start, transition);
+        let cut = standardisation.standardise(cut.view());
+        features.index_axis_mut(Axis(1), window).assign(&cut);
+        poses.write(window, 0..=transition, &clip.clip.poses[start..]);
+    }
+    let single_frames: Vec<_> = features
+        .axis_iter(Axis(1))
+        .map(|window| SingleFrame {
+            window: window
+                .insert_axis(Axis(1))
+                .as_standard_layout()
+                .into_owned(),
+            frame: transition.div_ceil(2),
+        })
+        .collect();
+    let batch = Batch {
+        poses: Some(poses),
+        total_single_frames: single_frames.len(),
+        single_frames,
+        ..Batch::of(features)
+    };
+    Ok((batch, standardisation))
+}
+
+/// The features alone of [`generated_batch`], standardised `[transition + 1, windows, 154]`.
+///
+/// # Errors
+/// As [`generated_batch`].
+pub fn generated_windows(
+    transition: usize,
+    windows: usize,
+    seed: u64,
+) -> Result<(Array3<f64>, Standardisation), GradientCheckError> {
+    let (batch, standardisation) = generated_batch(transition, windows, seed)?;
+    Ok((batch.features, standardisation))
+}
+
+/// Compares the gradient of a model's total loss with central differences: for critics of their own part of it, for all other
+/// weights of the rest (see [`super::LossTerms::critics`]). None where the model is never fed as the case says.
+///
+/// # Errors
+/// A model that is not trained, or whose settings do not fit together; nothing to check it on.
+pub fn check_model(
+    model: &ModelConfig,
+    case: GradientCase,
+    config: GradientCheckConfig,
+) -> Result<Option<CheckReport>, GradientCheckError> {
+    let (batch, standardisation) = generated_batch(case.transition, config.windows, config.seed)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+    let mut parameters = Parameters::<f64>::new();
+    let network = model.build(
+        &mut Initialiser::new(&mut parameters, &mut rng),
+        &standardisation,
+    )?;
+    if network.feed(case.feed) != case.feed {
+        return Ok(None);
+    }
+    for (_, value) in parameters.values_mut() {
+        value.mapv_inplace(|x| x + rng.random_range(-NOISE..NOISE));
+    }
+    let key = case.dropout.then_some(DROPOUT_KEY);
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    tape.set_dropout(key);
+    let total = network.losses(&mut tape, &batch, case.feed)?.total;
+    tape.check_finite()?;
+    tape.backward(total, &mut gradients)?;
+    let report = check_parameters(
+        &mut parameters,
+        &gradients,
+        config.per_parameter,
+        |parameters, name| {
+            let mut tape = Tape::inference(parameters, &mut workspace);
+            tape.set_dropout(key);
+            let losses = network.losses(&mut tape, &batch, case.feed)?;
+            let total = tape.values(losses.total)[0];
+            let critics = losses
+                .critics
+                .map_or(0.0, |critics| tape.values(critics)[0]);
+            Ok(match name.starts_with(CRITICS) {
+                true => critics,
+                false => total - critics,
+            })
+        },
+    )?;
+    Ok(Some(report))
+}

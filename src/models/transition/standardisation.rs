@@ -1,0 +1,89 @@
+//! Standardisation: mean and standard deviation of each feature over the training clips.
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use super::window::wrap;
+use crate::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING, FEATURES};
+
+/// A standard deviation below this, in the feature's unit, counts as 1: a number that never changes is only centred.
+pub(crate) const SMALLEST_STD: f64 = 1e-4;
+
+/// Mean and standard deviation of the 154 numbers of a frame, and the scales of the losses that are not standardised.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Standardisation {
+    /// `[154]`, each in its feature's unit.
+    pub mean: Vec<f64>,
+    /// `[154]`, each in its feature's unit.
+    pub std: Vec<f64>,
+    /// Root mean square of the standard deviations of p^b's 69 numbers, cm.
+    pub position_scale: f64,
+    /// Root mean square of the standard deviations of v^b's 69 numbers, cm/frame.
+    pub velocity_scale: f64,
+}
+
+impl Standardisation {
+    /// Statistics over all frames of the training clips, each `[frames, 154]`, every frame counting the same.
+    ///
+    /// The facing angle is measured in [-pi, pi), as at the start of a window: unwrapped along a clip it counts the turns that
+    /// the dancer has made, which no window shows. No frames give mean 0 and deviation 1.
+    pub fn fit<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Self {
+        let frames: usize = clips.clone().into_iter().map(|clip| clip.nrows()).sum();
+        let count = frames.max(1) as f64;
+        let mean_of = |deviation: &dyn Fn(usize, f64) -> f64| {
+            let mut sums = vec![0.0; FEATURES];
+            for clip in clips.clone() {
+                for frame in clip.rows() {
+                    for (column, (sum, &value)) in sums.iter_mut().zip(frame).enumerate() {
+                        let value = if column == FACING.start {
+                            wrap(value)
+                        } else {
+                            value
+                        };
+                        *sum += deviation(column, value);
+                    }
+                }
+            }
+            sums.iter_mut().for_each(|sum| *sum /= count);
+            sums
+        };
+        let mean = mean_of(&|_, value| value);
+        let variance = mean_of(&|column, value| (value - mean[column]).powi(2));
+        let std: Vec<f64> = variance
+            .into_iter()
+            .map(|variance| {
+                if variance.sqrt() < SMALLEST_STD {
+                    1.0
+                } else {
+                    variance.sqrt()
+                }
+            })
+            .collect();
+        let root_mean_square = |std: &[f64]| {
+            (std.iter().map(|value| value * value).sum::<f64>() / std.len() as f64).sqrt()
+        };
+        let position_scale = root_mean_square(&std[BODY_POSITIONS]);
+        let velocity_scale = root_mean_square(&std[BODY_VELOCITIES]);
+        Self {
+            mean,
+            std,
+            position_scale,
+            velocity_scale,
+        }
+    }
+
+    /// `(x - mean) / std` of the leading columns that `features` has, `[frames, up to 154]`.
+    pub fn standardise(&self, features: ArrayView2<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(features.raw_dim(), |(row, column)| {
+            (features[[row, column]] - self.mean[column]) / self.std[column]
+        })
+    }
+
+    /// The inverse of [`Standardisation::standardise`].
+    pub fn restore(&self, standardised: ArrayView2<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(standardised.raw_dim(), |(row, column)| {
+            standardised[[row, column]] * self.std[column] + self.mean[column]
+        })
+    }
+}

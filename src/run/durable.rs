@@ -1,0 +1,71 @@
+//! Files that are there whole or not at all, whenever the process or the machine stops.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// A file or folder that could not be dealt with.
+#[derive(Debug, Error)]
+#[error("{path} cannot be {action}: {cause}")]
+pub struct FileError {
+    pub path: PathBuf,
+    /// "written", "read", "created", "removed", "locked".
+    pub action: &'static str,
+    pub cause: io::Error,
+}
+
+impl FileError {
+    /// To be given to `map_err`.
+    pub(crate) fn at(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |cause| Self {
+            path: path.into(),
+            action,
+            cause,
+        }
+    }
+}
+
+/// Writes a new file, down to the disk.
+pub(crate) fn write_synced(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    let write = || -> io::Result<()> {
+        let mut file = File::create(path)?;
+        file.write_all(content)?;
+        file.sync_all()
+    };
+    write().map_err(FileError::at(path, "written"))
+}
+
+/// Replaces a file by a whole new one: written beside it, then renamed.
+pub(crate) fn replace(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!(".{name}.partial"));
+    write_synced(&partial, content)?;
+    rename(&partial, path)
+}
+
+/// Renames within one folder, down to the disk.
+pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
+    fs::rename(from, to).map_err(FileError::at(to, "written"))?;
+    sync_folder(to.parent().unwrap_or(Path::new("")))
+}
+
+/// Makes what was renamed in a folder last.
+#[cfg(unix)]
+pub(crate) fn sync_folder(path: &Path) -> Result<(), FileError> {
+    let path = if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    };
+    File::open(path)
+        .and_then(|folder| folder.sync_all())
+        .map_err(FileError::at(path, "written"))
+}
+
+/// Other systems do not open folders.
+#[cfg(not(unix))]
+pub(crate) fn sync_folder(_path: &Path) -> Result<(), FileError> {
+    Ok(())
+}

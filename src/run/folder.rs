@@ -1,0 +1,230 @@
+//! A run's folder.
+//!
+//! ```text
+//! config.toml            the resolved config
+//! manifest.json          what was trained, on what, where, and how far it got
+//! log.jsonl              a line a step: every loss term
+//! checkpoints/step-*/    weights.safetensors and state.bin
+//! weights.safetensors    the trained model, once finished
+//! evaluation*.json       its scores, and on what they were measured, once evaluated
+//! .lock                  locked while a training writes here
+//! ```
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::checkpoint::{self, WEIGHTS_FILE};
+use super::durable::{self, FileError};
+use super::lock::FolderLock;
+use super::log::{self, LogLine};
+use super::manifest::{self, Build, Manifest};
+use crate::experiment::config::ExperimentConfig;
+use crate::training::error::TrainingError;
+
+const MANIFEST: &str = "manifest.json";
+const LOG: &str = "log.jsonl";
+const CHECKPOINTS: &str = "checkpoints";
+
+/// A folder that holds one run. To write to it takes [`RunFolder::create`], [`RunFolder::replace`] or [`RunFolder::resume`], which
+/// keep all others from doing so while the value lives.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// None where it was opened to be read.
+    _lock: Option<FolderLock>,
+}
+
+impl RunFolder {
+    /// Name of the resolved config's file: a folder that has it is a run's.
+    pub const CONFIG: &str = "config.toml";
+
+    /// A folder for a new run; made where there is none.
+    ///
+    /// # Errors
+    /// The folder holds a run already, another training writes to it, or it cannot be written.
+    pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+        let run = Self::locked(path)?;
+        run.begin(config)?;
+        Ok(run)
+    }
+
+    /// A folder for a new run, in place of an earlier run of the same name.
+    ///
+    /// # Errors
+    /// The folder holds a run of another name, another training writes to it, or it cannot be written.
+    pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+        let run = Self::locked(path)?;
+        if run.config_path().exists() && run.config()?.name == config.name {
+            checkpoint::remove(&run.checkpoints())?;
+            for file in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG].map(|name| path.join(name)) {
+                match fs::remove_file(&file) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(FileError::at(&file, "removed")(error).into());
+                    }
+                    _ => {}
+                }
+            }
+        }
+        run.begin(config)?;
+        Ok(run)
+    }
+
+    /// The folder of a run that goes on; a new run where it has not begun.
+    ///
+    /// # Errors
+    /// The run there has another config, another training writes to it, or it cannot be read or written.
+    pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+        let run = Self::locked(path)?;
+        if !run.config_path().exists() {
+            run.begin(config)?;
+            return Ok(run);
+        }
+        run.check_config(config)?;
+        checkpoint::remove_partial(&run.checkpoints())?;
+        Ok(run)
+    }
+
+    /// The folder of a run, as it is, to read.
+    pub fn open(path: &Path) -> Self {
+        Self {
+            path: path.into(),
+            _lock: None,
+        }
+    }
+
+    fn locked(path: &Path) -> Result<Self, TrainingError> {
+        fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
+        Ok(Self {
+            path: path.into(),
+            _lock: Some(FolderLock::take(path)?),
+        })
+    }
+
+    fn begin(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+        let path = &self.path;
+        if [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE]
+            .iter()
+            .any(|name| path.join(name).exists())
+        {
+            return Err(TrainingError::RunExists { path: path.into() });
+        }
+        durable::replace(&path.join(Self::CONFIG), config.to_toml()?.as_bytes())?;
+        Ok(())
+    }
+
+    /// Refuses a config that differs from the run's.
+    fn check_config(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+        let differences = self.config()?.differences(config)?;
+        if differences.is_empty() {
+            Ok(())
+        } else {
+            Err(TrainingError::OtherConfig {
+                path: self.config_path(),
+                differences,
+            })
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The folder of checkpoints.
+    pub fn checkpoints(&self) -> PathBuf {
+        self.path.join(CHECKPOINTS)
+    }
+
+    /// The weights of a finished run.
+    pub fn weights(&self) -> PathBuf {
+        self.path.join(WEIGHTS_FILE)
+    }
+
+    /// The file of the resolved config.
+    pub fn config_path(&self) -> PathBuf {
+        self.path.join(Self::CONFIG)
+    }
+
+    /// The file of the manifest.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.path.join(MANIFEST)
+    }
+
+    /// The resolved config.
+    ///
+    /// # Errors
+    /// It cannot be read, or this version does not know one of its keys.
+    pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
+        ExperimentConfig::load(&self.config_path(), &[])
+            .map_err(|error| self.or_other_version(error.into()))
+    }
+
+    /// The file of the log.
+    pub(crate) fn log_path(&self) -> PathBuf {
+        self.path.join(LOG)
+    }
+
+    /// The lines of the log; none before the training has begun.
+    ///
+    /// # Errors
+    /// It cannot be read or holds something else.
+    pub fn log(&self) -> Result<Vec<LogLine>, TrainingError> {
+        log::read(&self.log_path())
+    }
+
+    /// The manifest; none before the training has begun.
+    ///
+    /// # Errors
+    /// It cannot be read, is none, or is of a newer version of the program.
+    pub fn manifest(&self) -> Result<Option<Manifest>, TrainingError> {
+        let path = self.manifest_path();
+        if !path.exists() {
+            return Ok(None);
+        }
+        let text = fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
+        let read = serde_json::from_str(&text).map_err(|cause| TrainingError::Manifest {
+            path: path.clone(),
+            cause,
+        });
+        let read = read.and_then(|manifest: Manifest| match manifest.format {
+            ..=manifest::FORMAT => Ok(manifest),
+            found => Err(TrainingError::ManifestFormat {
+                path,
+                found,
+                newest: manifest::FORMAT,
+            }),
+        });
+        match read {
+            Ok(manifest) => Ok(Some(manifest)),
+            Err(error) => Err(self.or_other_version(error)),
+        }
+    }
+
+    /// The error, with the version of the program that made the run where it is another one.
+    pub(crate) fn or_other_version(&self, error: TrainingError) -> TrainingError {
+        let text = fs::read_to_string(self.path.join(MANIFEST)).unwrap_or_default();
+        match serde_json::from_str::<Build>(&text) {
+            Ok(made_by) if made_by != Build::this() => TrainingError::OtherVersion {
+                path: self.path.clone(),
+                made_by: made_by.to_string(),
+                this: Build::this().to_string(),
+                cause: Box::new(error),
+            },
+            _ => error,
+        }
+    }
+
+    pub(crate) fn write_manifest(&self, manifest: &Manifest) -> Result<(), TrainingError> {
+        let path = self.manifest_path();
+        let mut text =
+            serde_json::to_vec_pretty(manifest).map_err(|cause| TrainingError::Manifest {
+                path: path.clone(),
+                cause,
+            })?;
+        text.push(b'\n');
+        Ok(durable::replace(&path, &text)?)
+    }
+
+    pub(crate) fn write_weights(&self, content: &[u8]) -> Result<(), FileError> {
+        durable::replace(&self.weights(), content)
+    }
+}

@@ -1,0 +1,165 @@
+//! A run's manifest: what was trained, on what, where, and how far it got.
+
+use std::fmt;
+use std::time::SystemTime;
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::{DanceClip, Dataset};
+use crate::experiment::config::ExperimentConfig;
+use crate::models::transition::DataRanges;
+use crate::models::transition::schedule::Schedule;
+
+/// Format of the manifest; raised when an older program would misread a newer one. Manifests from before it was written have 1.
+pub(crate) const FORMAT: u32 = 1;
+
+/// A version of this program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Build {
+    pub version: String,
+    /// The commit, where it was built in a git checkout.
+    pub commit: Option<String>,
+}
+
+impl Build {
+    /// The version that runs.
+    pub fn this() -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
+        }
+    }
+}
+
+impl fmt::Display for Build {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.commit {
+            Some(commit) => write!(f, "{} (commit {commit})", self.version),
+            None => f.write_str(&self.version),
+        }
+    }
+}
+
+/// How a run stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunState {
+    /// Running, or ended without a word: then the newest checkpoint says how far it got.
+    Running,
+    /// Stopped on request, saved.
+    Stopped,
+    /// A loss or gradient was not finite.
+    Diverged,
+    Finished,
+}
+
+/// `manifest.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    #[serde(default = "first_format")]
+    pub format: u32,
+    /// The config's name.
+    pub name: String,
+    pub seed: u64,
+    pub state: RunState,
+    /// Version of keydance, and its commit where it was built in a git checkout.
+    pub version: String,
+    pub commit: Option<String>,
+    pub cpu: String,
+    pub threads: usize,
+    /// UTC, RFC 3339.
+    pub started: String,
+    pub finished: Option<String>,
+    /// Wall-clock time of training, over all resumptions.
+    pub seconds: f64,
+    pub steps_done: u64,
+    pub steps: u64,
+    pub frame_steps_done: u64,
+    pub frame_steps: u64,
+    /// Frames that the whole schedule predicts, of which schedule.fraction takes `frame_steps`.
+    #[serde(default)]
+    pub whole_schedule_frame_steps: Option<u64>,
+    pub train: Part,
+    pub test: Part,
+    pub data_digest: String,
+    /// Bounds of the controls in the training clips; runs of earlier versions have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub data_ranges: Option<DataRanges>,
+    /// Weights in all parameters together.
+    pub parameters: usize,
+    /// SHA-256 of the weights (see [`crate::models::weights::digest`]), once finished.
+    pub weights_digest: Option<String>,
+}
+
+fn first_format() -> u32 {
+    1
+}
+
+/// Size of a part of the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    pub clips: usize,
+    pub frames: usize,
+}
+
+impl Part {
+    fn of(clips: &[DanceClip]) -> Self {
+        Self {
+            clips: clips.len(),
+            frames: clips.iter().map(DanceClip::frames).sum(),
+        }
+    }
+}
+
+impl Manifest {
+    /// The manifest of a run that begins now.
+    pub(crate) fn new(
+        config: &ExperimentConfig,
+        dataset: &Dataset,
+        schedule: &Schedule,
+        parameters: usize,
+        threads: usize,
+    ) -> Self {
+        let Build { version, commit } = Build::this();
+        Self {
+            format: FORMAT,
+            name: config.name.clone(),
+            seed: config.seed,
+            state: RunState::Running,
+            version,
+            commit,
+            cpu: cpu(),
+            threads,
+            started: now(),
+            finished: None,
+            seconds: 0.0,
+            steps_done: 0,
+            steps: schedule.steps(),
+            frame_steps_done: 0,
+            frame_steps: schedule.frame_steps(),
+            whole_schedule_frame_steps: Some(schedule.whole_frame_steps()),
+            train: Part::of(&dataset.train),
+            test: Part::of(&dataset.test),
+            data_digest: dataset.digest.clone(),
+            data_ranges: DataRanges::of(dataset.train.iter().map(|clip| clip.features.view())),
+            parameters,
+            weights_digest: None,
+        }
+    }
+}
+
+/// This moment, UTC, RFC 3339.
+pub(crate) fn now() -> String {
+    humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
+}
+
+/// The CPU's name where the system tells it, else its architecture.
+fn cpu() -> String {
+    let name = std::fs::read_to_string("/proc/cpuinfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|line| line.starts_with("model name"))?;
+            Some(line.split_once(':')?.1.trim().to_string())
+        });
+    name.unwrap_or_else(|| std::env::consts::ARCH.into())
+}

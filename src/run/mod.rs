@@ -1,0 +1,18 @@
+//! A run's folder: config, manifest, log, checkpoints, weights, each there whole or not at all.
+
+pub mod checkpoint;
+pub(crate) mod durable;
+pub(crate) mod folder;
+mod lock;
+pub(crate) mod log;
+pub mod manifest;
+pub mod state;
+mod status;
+mod trained_model;
+
+pub use durable::FileError;
+pub(crate) use durable::replace as replace_file;
+pub use folder::RunFolder;
+pub use log::LogLine;
+pub use manifest::{Manifest, RunState};
+pub use status::{RunProgress, RunStatus};
