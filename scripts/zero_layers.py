@@ -4,7 +4,7 @@
     python scripts/zero_layers.py runs/whole_model runs/without_recurrent state_decoder.4 root_decoder.4
     keydance evaluate runs/without_recurrent --data DANCE --clips validation
 
-`docs/model.md` names the layers.
+`docs/pan2021.md` names the layers.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""The numbers of a frame, the skeleton and the velocity factors, as docs/model.md states them."""
+"""The numbers of a frame, the skeleton and the velocity factors, as docs/pan2021.md states them."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The model of docs/model.md, as fast as we can make it with PyTorch on a CPU; the same mathematics as reference.py.
+"""The model of docs/pan2021.md, as fast as we can make it with PyTorch on a CPU; the same mathematics as reference.py.
 
 What is done otherwise:
 - Everything is feature-major, [features, ..., B]: one large product a layer, and attention, layer norm and

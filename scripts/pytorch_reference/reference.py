@@ -1,4 +1,4 @@
-"""The model of docs/model.md out of plain torch.nn modules: slow, and easy to see that it is right.
+"""The model of docs/pan2021.md out of plain torch.nn modules: slow, and easy to see that it is right.
 
 B windows of N + 1 frames, time first: window [N + 1, B, 154], standardised; frame 0 is k1, frame N is k2.
 """
