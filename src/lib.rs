@@ -18,6 +18,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod autograd;
+#[cfg(any())]
 pub mod cli;
 pub mod data;
 pub mod evaluation;
@@ -26,7 +27,9 @@ pub mod models;
 pub mod motion;
 pub mod nn;
 pub mod optim;
+#[cfg(any())]
 pub mod report;
 pub mod run;
+#[cfg(feature = "papers")]
 pub mod synthesis;
 pub mod training;

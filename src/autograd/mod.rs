@@ -18,6 +18,6 @@ mod workspace;
 
 pub use error::AutogradError;
 pub use kernels::Real;
-pub use parameters::{BlockId, Gradients, ParameterId, Parameters};
+pub use parameters::{BlockId, BufferId, Gradients, ParameterId, Parameters};
 pub use tape::{Backward, Operation, Tape, Target, Var};
 pub use workspace::Workspace;

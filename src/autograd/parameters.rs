@@ -15,6 +15,10 @@ pub struct ParameterId(pub(super) usize);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockId(pub(super) usize);
 
+/// A buffer of a [`Parameters`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct BufferId(usize);
+
 #[derive(Debug, Clone)]
 struct Parameter<T> {
     name: String,
@@ -32,11 +36,13 @@ struct Block<T> {
     packed_transposed: OnceLock<Packed<T>>,
 }
 
-/// Named weights. Shared read-only by the tapes of a step; changed between steps only.
+/// Named weights, and named buffers: state that is saved with them and that no gradient moves, such as running means. Shared
+/// read-only by the tapes of a step; changed between steps only.
 #[derive(Debug, Clone, Default)]
 pub struct Parameters<T> {
     parameters: Vec<Parameter<T>>,
     blocks: Vec<Block<T>>,
+    buffers: Vec<Parameter<T>>,
 }
 
 impl<T: Real> Parameters<T> {
@@ -44,7 +50,48 @@ impl<T: Real> Parameters<T> {
         Self {
             parameters: Vec::new(),
             blocks: Vec::new(),
+            buffers: Vec::new(),
         }
+    }
+
+    /// Adds a buffer.
+    pub fn add_buffer(&mut self, name: impl Into<String>, value: ArrayD<T>) -> BufferId {
+        self.buffers.push(Parameter {
+            name: name.into(),
+            value: value.as_standard_layout().into_owned(),
+        });
+        BufferId(self.buffers.len() - 1)
+    }
+
+    /// The values of a buffer.
+    pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
+        &self.buffers[id.0].value
+    }
+
+    /// The values of a buffer, to be changed.
+    pub fn buffer_mut(&mut self, id: BufferId) -> &mut ArrayD<T> {
+        &mut self.buffers[id.0].value
+    }
+
+    /// Names and values of the buffers, in the order in which they were added.
+    pub fn buffers(&self) -> impl Iterator<Item = (&str, &ArrayD<T>)> {
+        self.buffers
+            .iter()
+            .map(|buffer| (buffer.name.as_str(), &buffer.value))
+    }
+
+    /// All that a weights file holds, to be changed: parameters, then buffers.
+    pub fn saved_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
+        self.forget_packed();
+        self.parameters
+            .iter_mut()
+            .chain(&mut self.buffers)
+            .map(|saved| (saved.name.as_str(), &mut saved.value))
+    }
+
+    /// All that a weights file holds: parameters, then buffers.
+    pub fn saved(&self) -> impl Iterator<Item = (&str, &ArrayD<T>)> {
+        self.iter().chain(self.buffers())
     }
 
     /// Adds a parameter and the block that covers it whole.
@@ -110,13 +157,17 @@ impl<T: Real> Parameters<T> {
 
     /// The values one after another, to be changed; what was packed of them is forgotten.
     pub fn values_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
+        self.forget_packed();
+        self.parameters
+            .iter_mut()
+            .map(|parameter| (parameter.name.as_str(), &mut parameter.value))
+    }
+
+    fn forget_packed(&mut self) {
         for block in &mut self.blocks {
             block.packed.take();
             block.packed_transposed.take();
         }
-        self.parameters
-            .iter_mut()
-            .map(|parameter| (parameter.name.as_str(), &mut parameter.value))
     }
 
     pub(super) fn block_shape(&self, id: BlockId) -> &[usize] {

@@ -4,7 +4,7 @@ use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::error::AutogradError;
 use super::kernels::{Mat, MatMut, Packed, Real, product_at};
-use super::parameters::{BlockId, Gradients, Parameters};
+use super::parameters::{BlockId, BufferId, Gradients, Parameters};
 use super::staging::{DIRECT_ROWS, Staging};
 use super::workspace::Workspace;
 
@@ -344,6 +344,11 @@ impl<'a, T: Real> Tape<'a, T> {
                 .map(|&v| self.shape(v).to_vec())
                 .collect(),
         }
+    }
+
+    /// The values of a buffer, such as a running mean; on the tape they are a constant like any other.
+    pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
+        self.parameters.buffer(id)
     }
 
     /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all parameters to `gradients`.

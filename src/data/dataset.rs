@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use ndarray::Array2;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use thiserror::Error;
@@ -12,29 +11,22 @@ use thiserror::Error;
 use super::config::DataConfig;
 use super::split::{Parts, check_dance_frames, split};
 use crate::motion::bvh::{self, BvhError};
-use crate::motion::{
-    Clip, FeatureError, Mapping, MappingError, ResampleError, at_tempo, features, mirror_image,
-    resample,
-};
+use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
 
-/// A clip on the dance skeleton, with its features.
+/// A recorded dance.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DanceClip {
-    /// The file's name with its extension.
-    pub name: String,
-    /// `[frames, 154]`, not standardised, the facing angle unwrapped along the clip.
-    pub features: Array2<f64>,
-    /// The motion at the config's rate.
+pub struct Recording {
+    /// The motion at the config's rate; its name is the file's, with the extension.
     pub clip: Clip,
 }
 
 /// A data set, split.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
-    pub train: Vec<DanceClip>,
+    pub train: Vec<Recording>,
     /// Cut from the training clips; empty unless the config asks for it.
-    pub validation: Vec<DanceClip>,
-    pub test: Vec<DanceClip>,
+    pub validation: Vec<Recording>,
+    pub test: Vec<Recording>,
     /// SHA-256 over the files' names and bytes, hexadecimal: what
     /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over names and poses.
     pub digest: String,
@@ -86,11 +78,11 @@ pub enum DataError {
     Features(#[from] FeatureError),
 }
 
-impl DanceClip {
-    /// A clip brought to the config's rate, put on the dance skeleton by `mapping` where there is one, and measured.
+impl Recording {
+    /// A clip brought to the config's rate and, where there is a mapping, onto its skeleton.
     ///
     /// # Errors
-    /// The clip cannot be resampled, mapped or measured.
+    /// The clip cannot be resampled or mapped.
     pub fn new(
         clip: Clip,
         mapping: Option<&Mapping>,
@@ -101,32 +93,17 @@ impl DanceClip {
             Some(mapping) => mapping.apply(&clip)?,
             None => clip,
         };
-        Ok(Self {
-            name: clip.name.clone(),
-            features: features(&clip, &config.features())?,
-            clip,
-        })
+        Ok(Self { clip })
     }
 
-    /// The clip in the mirror, see [`mirror_image`].
-    ///
-    /// # Errors
-    /// The image cannot be measured.
-    pub fn mirror_image(&self, config: &DataConfig) -> Result<Self, DataError> {
-        Self::new(mirror_image(&self.clip), None, config)
-    }
-
-    /// The clip danced `tempo` times as fast, see [`at_tempo`].
-    ///
-    /// # Errors
-    /// It would be too long, or cannot be measured.
-    pub fn at_tempo(&self, tempo: f64, config: &DataConfig) -> Result<Self, DataError> {
-        Self::new(at_tempo(self.clip.clone(), tempo)?, None, config)
+    /// The file's name with its extension.
+    pub fn name(&self) -> &str {
+        &self.clip.name
     }
 
     /// Number of frames.
     pub fn frames(&self) -> usize {
-        self.features.nrows()
+        self.clip.poses.len()
     }
 }
 
@@ -157,7 +134,7 @@ impl Dataset {
         let names: Vec<String> = by_name.keys().cloned().collect();
         Self::assemble(&names, "the set of clips", config, |name, mapping| {
             let clip = &by_name[name];
-            let measured = DanceClip::new(clip.clone(), mapping, config)?;
+            let measured = Recording::new(clip.clone(), mapping, config)?;
             Ok((measured, pose_digest(clip)))
         })
     }
@@ -167,11 +144,11 @@ impl Dataset {
         names: &[String],
         origin: &str,
         config: &DataConfig,
-        read: impl Fn(&String, Option<&Mapping>) -> Result<(DanceClip, String), DataError> + Sync,
+        read: impl Fn(&String, Option<&Mapping>) -> Result<(Recording, String), DataError> + Sync,
     ) -> Result<Self, DataError> {
         let parts = split(names, origin, config)?;
         let mapping = config.mapping.as_deref().map(Mapping::read).transpose()?;
-        let read = |names: &Vec<String>| -> Result<Vec<(DanceClip, String)>, DataError> {
+        let read = |names: &Vec<String>| -> Result<Vec<(Recording, String)>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
                 .map(|name| read(name, mapping.as_ref()))
@@ -186,7 +163,7 @@ impl Dataset {
         let (train, validation, test) = (read(train)?, read(validation)?, read(test)?);
         let digest = digest(train.iter().chain(&validation).chain(&test));
         let clips =
-            |part: Vec<(DanceClip, String)>| part.into_iter().map(|(clip, _)| clip).collect();
+            |part: Vec<(Recording, String)>| part.into_iter().map(|(clip, _)| clip).collect();
         let dataset = Self {
             train: clips(train),
             validation: clips(validation),
@@ -234,7 +211,7 @@ fn read_clip(
     name: &str,
     mapping: Option<&Mapping>,
     config: &DataConfig,
-) -> Result<(DanceClip, String), DataError> {
+) -> Result<(Recording, String), DataError> {
     let path = folder.join(name);
     let bytes = std::fs::read(&path).map_err(|source| DataError::File {
         path: path.clone(),
@@ -243,7 +220,7 @@ fn read_clip(
     let mut clip = bvh::parse(&bytes, &path.display().to_string())?.to_clip();
     clip.name = name.into();
     Ok((
-        DanceClip::new(clip, mapping, config)?,
+        Recording::new(clip, mapping, config)?,
         hexadecimal(&Sha256::digest(&bytes)),
     ))
 }
@@ -262,9 +239,9 @@ fn pose_digest(clip: &Clip) -> String {
     hexadecimal(&hash.finalize())
 }
 
-fn digest<'a>(clips: impl Iterator<Item = &'a (DanceClip, String)>) -> String {
+fn digest<'a>(clips: impl Iterator<Item = &'a (Recording, String)>) -> String {
     let mut lines: Vec<(&str, &str)> = clips
-        .map(|(clip, digest)| (clip.name.as_str(), digest.as_str()))
+        .map(|(clip, digest)| (clip.name(), digest.as_str()))
         .collect();
     lines.sort_unstable();
     let list: String = lines

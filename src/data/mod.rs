@@ -1,10 +1,12 @@
-//! Data sets: clips become features and a split.
+//! Data sets: files become recordings, recordings a split.
 
 pub mod choreography;
 pub mod config;
 pub mod dataset;
+mod part;
 mod split;
 
 pub use config::{DataConfig, Split};
 pub(crate) use dataset::hexadecimal;
-pub use dataset::{DanceClip, DataError, Dataset};
+pub use dataset::{DataError, Dataset, Recording};
+pub use part::{DataPart, EmptyPart};

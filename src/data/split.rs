@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::config::{DataConfig, Split};
-use super::dataset::{DanceClip, DataError, Dataset};
+use super::dataset::{DataError, Dataset, Recording};
 
 /// What the paper's split must hold: clips and frames for training, clips and frames for testing.
 const DANCE_TRAIN: (usize, usize) = (98, 93_347);
@@ -151,7 +151,7 @@ pub(super) fn check_dance_frames(
     origin: &str,
     config: &DataConfig,
 ) -> Result<(), DataError> {
-    let frames = |clips: &[DanceClip]| clips.iter().map(DanceClip::frames).sum::<usize>();
+    let frames = |clips: &[Recording]| clips.iter().map(Recording::frames).sum::<usize>();
     let found = (
         frames(&dataset.train) + frames(&dataset.validation),
         frames(&dataset.test),

@@ -1,18 +1,15 @@
-//! Evaluation: the paper's three scores of a model, by a frozen protocol, and the tables that set them beside the paper's.
+//! Evaluation: frozen protocols that score a model, and the tables that set its scores beside a paper's.
 
-pub mod effect;
-pub mod metrics;
-pub mod paper;
+#[cfg(feature = "papers")]
+pub mod equations;
+mod metric;
+mod printed;
 pub mod protocol;
 pub mod scores;
 pub mod tables;
-pub mod window_request;
 
-pub use effect::{
-    FOLLOWED, Response, body_distance, mean_rows, mean_velocity_factors, root_response,
-};
-pub use metrics::{WindowScores, window_scores};
-pub use protocol::{EvaluationError, Outcome, Protocol, SkippedClip};
-pub use scores::{Evaluation, LengthScores};
-pub use tables::{TableRow, markdown_tables, terminal_tables};
-pub use window_request::window_request;
+pub use metric::{Better, Metric};
+pub use printed::{PrintedError, PrintedRow, PrintedTable, PrintedTables};
+pub use protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
+pub use scores::{ScoreRow, Scores};
+pub use tables::{TableRow, Tables};

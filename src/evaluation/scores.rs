@@ -1,85 +1,181 @@
 //! The scores of a model, and their JSON.
 
-use std::collections::BTreeMap;
+use std::fmt;
 
-use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// One score at each transition length and its mean over the lengths: `{"10": .., "50": .., "avg": ..}`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(try_from = "BTreeMap<String, f64>")]
-pub struct LengthScores {
-    by_length: BTreeMap<usize, f64>,
-    average: f64,
+/// The column of a mean over the others.
+pub const AVERAGE: &str = "avg";
+/// The key of the numbers of windows among those of metrics.
+const WINDOWS: &str = "windows";
+
+/// One metric's score in each column of its table, such as a transition length and the mean over all: `{"10": .., "avg": ..}`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ScoreRow {
+    columns: Vec<(String, f64)>,
 }
 
-impl LengthScores {
-    /// Scores by transition length N; AVG is their plain mean (NaN for none).
-    pub fn new(by_length: BTreeMap<usize, f64>) -> Self {
-        let average = by_length.values().sum::<f64>() / by_length.len() as f64;
-        Self { by_length, average }
-    }
-
-    /// The score at transition length N.
-    pub fn at(&self, length: usize) -> Option<f64> {
-        self.by_length.get(&length).copied()
-    }
-
-    /// The lengths, ascending.
-    pub fn lengths(&self) -> impl Iterator<Item = usize> + '_ {
-        self.by_length.keys().copied()
-    }
-
-    /// AVG: the mean over the lengths.
-    pub fn average(&self) -> f64 {
-        self.average
-    }
-}
-
-impl Serialize for LengthScores {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.by_length.len() + 1))?;
-        for (length, score) in &self.by_length {
-            map.serialize_entry(&length.to_string(), score)?;
+impl ScoreRow {
+    /// Scores by column, in their order.
+    pub fn new(columns: impl IntoIterator<Item = (impl fmt::Display, f64)>) -> Self {
+        Self {
+            columns: columns
+                .into_iter()
+                .map(|(column, score)| (column.to_string(), score))
+                .collect(),
         }
-        map.serialize_entry("avg", &self.average)?;
+    }
+
+    /// The same, and after them [`AVERAGE`], their plain mean (NaN for none).
+    #[must_use]
+    pub fn with_average(mut self) -> Self {
+        let sum: f64 = self.columns.iter().map(|(_, score)| score).sum();
+        let average = sum / self.columns.len() as f64;
+        self.columns.push((AVERAGE.into(), average));
+        self
+    }
+
+    /// The score in a column.
+    pub fn at(&self, column: impl fmt::Display) -> Option<f64> {
+        let name = column.to_string();
+        let found = self.columns.iter().find(|(column, _)| *column == name);
+        found.map(|&(_, score)| score)
+    }
+
+    /// The columns, in their order.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.columns.iter().map(|(column, _)| column.as_str())
+    }
+
+    /// The mean over the other columns; NaN where there is none.
+    pub fn average(&self) -> f64 {
+        self.at(AVERAGE).unwrap_or(f64::NAN)
+    }
+}
+
+/// The scores of a model by a protocol, a row a metric, and how many windows stand behind each column, as written to JSON:
+/// `{"lrp": {"10": .., "avg": ..}, .., "windows": {"10": ..}}`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scores {
+    rows: Vec<(String, ScoreRow)>,
+    /// Number of windows of each column that has its own.
+    windows: Vec<(String, usize)>,
+}
+
+impl Scores {
+    /// Scores by the metrics' keys, and numbers of windows by column.
+    pub fn new(
+        rows: impl IntoIterator<Item = (&'static str, ScoreRow)>,
+        windows: impl IntoIterator<Item = (impl fmt::Display, usize)>,
+    ) -> Self {
+        let rows = rows.into_iter().map(|(key, row)| (key.to_string(), row));
+        let windows = windows.into_iter();
+        Self {
+            rows: rows.collect(),
+            windows: windows
+                .map(|(column, count)| (column.to_string(), count))
+                .collect(),
+        }
+    }
+
+    /// The row of a metric; none where the model has no score by it.
+    pub fn row(&self, metric: &str) -> Option<&ScoreRow> {
+        let found = self.rows.iter().find(|(key, _)| key == metric);
+        found.map(|(_, row)| row)
+    }
+
+    /// The rows by metric, in their order.
+    pub fn rows(&self) -> impl Iterator<Item = (&str, &ScoreRow)> {
+        self.rows.iter().map(|(key, row)| (key.as_str(), row))
+    }
+
+    /// Number of windows behind a column.
+    pub fn windows_of(&self, column: &str) -> Option<usize> {
+        let found = self.windows.iter().find(|(name, _)| name == column);
+        found.map(|&(_, count)| count)
+    }
+
+    /// Numbers of windows by column.
+    pub fn windows(&self) -> &[(String, usize)] {
+        &self.windows
+    }
+}
+
+/// A map in its own order.
+struct InOrder<'a, V>(&'a [(String, V)]);
+
+impl<V: Serialize> Serialize for InOrder<'_, V> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
+    }
+}
+
+/// Reads a map and keeps its order.
+fn in_order<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Vec<(String, V)>, D::Error> {
+    struct Entries<V>(std::marker::PhantomData<V>);
+    impl<'de, V: Deserialize<'de>> Visitor<'de> for Entries<V> {
+        type Value = Vec<(String, V)>;
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a map")
+        }
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut entries = Vec::new();
+            while let Some(entry) = map.next_entry()? {
+                entries.push(entry);
+            }
+            Ok(entries)
+        }
+    }
+    deserializer.deserialize_map(Entries(std::marker::PhantomData))
+}
+
+impl Serialize for ScoreRow {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        InOrder(&self.columns).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for ScoreRow {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let columns = in_order(deserializer)?;
+        Ok(Self { columns })
+    }
+}
+
+impl Serialize for Scores {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.rows.len() + 1))?;
+        for (key, row) in &self.rows {
+            map.serialize_entry(key, row)?;
+        }
+        map.serialize_entry(WINDOWS, &InOrder(&self.windows))?;
         map.end()
     }
 }
 
-impl TryFrom<BTreeMap<String, f64>> for LengthScores {
-    type Error = String;
-
-    fn try_from(mut entries: BTreeMap<String, f64>) -> Result<Self, String> {
-        let average = entries
-            .remove("avg")
-            .ok_or("scores by length have no entry \"avg\"")?;
-        let by_length = entries
-            .into_iter()
-            .map(|(key, score)| match key.parse() {
-                Ok(length) => Ok((length, score)),
-                Err(_) => Err(format!(
-                    "scores by length have the key {key:?}, expected a number of frames or \"avg\""
-                )),
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { by_length, average })
+impl<'de> Deserialize<'de> for Scores {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let entries: Vec<(String, ScoreRow)> = in_order(deserializer)?;
+        let mut scores = Self::default();
+        for (key, row) in entries {
+            if key == WINDOWS {
+                let counts = row.columns.into_iter();
+                scores.windows = counts
+                    .map(|(column, count)| (column, count as usize))
+                    .collect();
+            } else {
+                scores.rows.push((key, row));
+            }
+        }
+        if scores.rows.is_empty() || scores.windows.is_empty() {
+            return Err(D::Error::custom(
+                "scores have rows by metric, and \"windows\"",
+            ));
+        }
+        Ok(scores)
     }
-}
-
-/// LRP, AVF, ART and foot skate of a model by transition length, as written to JSON.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Evaluation {
-    /// Mean distance of root-relative positions, cm (eq. 12).
-    pub lrp: LengthScores,
-    /// Share of windows with the velocity factors asked for (eq. 13).
-    pub avf: LengthScores,
-    /// Share of windows on the root trajectory asked for (eq. 15).
-    pub art: LengthScores,
-    /// Foot skate, cm/frame: how far a foot joint moves in a frame in which the recorded one is in contact (lower is better; below 0.45 in recorded
-    /// motion, by the threshold of the labels). None in scores of earlier versions, or where some length has no contact.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub foot_skate: Option<LengthScores>,
-    /// Number of windows at each length.
-    pub windows: BTreeMap<usize, usize>,
 }

@@ -1,11 +1,15 @@
 //! Configs from files: small overrides on a base, overrides of the command line on top, unknown keys refused.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use thiserror::Error;
 use toml::{Table, Value};
 
-use super::config::{ExperimentConfig, ValueError};
+use super::config::{ExperimentConfig, Shared};
+use crate::evaluation::EvaluationOptions;
+use crate::models::registry;
+use crate::models::settings::{ModelKind, ValueError};
 
 /// The key that names the file that a config overrides.
 const BASE: &str = "base";
@@ -106,7 +110,29 @@ impl ExperimentConfig {
     /// # Errors
     /// A number that TOML does not have.
     pub fn to_toml(&self) -> Result<String, ConfigError> {
-        Ok(toml::to_string(self)?)
+        Ok(toml::to_string(&self.to_table()?)?)
+    }
+
+    fn to_table(&self) -> Result<Table, ConfigError> {
+        let shared = Table::try_from(Shared {
+            name: self.name.clone(),
+            seed: self.seed,
+            data: self.data.clone(),
+            optimiser: self.optimiser.clone(),
+            checkpoint: self.checkpoint.clone(),
+            log: self.log.clone(),
+            validation: self.validation.clone(),
+        })?;
+        let mut table = Table::new();
+        let own = self.model.tables()?;
+        for (key, value) in shared {
+            let is_data = key == "data";
+            table.insert(key, value);
+            if is_data {
+                table.extend(own.clone());
+            }
+        }
+        Ok(table)
     }
 
     /// The keys whose values differ: `key: value here, value there`.
@@ -115,8 +141,8 @@ impl ExperimentConfig {
     /// A number that TOML does not have.
     pub fn differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-        flatten("", &Value::Table(Table::try_from(self)?), &mut ours);
-        flatten("", &Value::Table(Table::try_from(other)?), &mut theirs);
+        flatten("", &Value::Table(self.to_table()?), &mut ours);
+        flatten("", &Value::Table(other.to_table()?), &mut theirs);
         let mut keys: Vec<&String> = ours.iter().chain(&theirs).map(|(key, _)| key).collect();
         keys.sort_unstable();
         keys.dedup();
@@ -132,17 +158,18 @@ impl ExperimentConfig {
             .collect())
     }
 
-    /// The differences that a training would notice: all but what begins after the network's prediction.
+    /// The differences that a training would notice: all but those of keys that act after the network.
     ///
     /// # Errors
     /// A number that TOML does not have.
     pub fn training_differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
-        let refining = other.model.refines_velocities();
-        let same_after_prediction = Self {
-            model: self.model.clone().refining_velocities(refining),
-            ..self.clone()
-        };
-        same_after_prediction.differences(other)
+        let mut differences = self.differences(other)?;
+        let after = other.model.keys_after_the_network();
+        differences.retain(|difference| {
+            let (key, _) = difference.split_once(':').unwrap_or((difference, ""));
+            !after.contains(&key)
+        });
+        Ok(differences)
     }
 }
 
@@ -249,40 +276,156 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
 
 /// Merges the layers onto the defaults and checks after each, so that an error names the layer that brought it.
 fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
-    let mut config = ExperimentConfig::default();
-    let mut table = Table::try_from(&config)?;
-    let mut last = "the defaults";
+    let mut kind = registry::kinds().into_iter().next().ok_or_else(no_kinds)?;
+    let mut table = Table::try_from(Shared::default())?;
+    table.remove("name");
+    table.extend(kind.defaults());
+    let mut read = None;
+    let mut own = Vec::new();
     for Layer {
         origin,
         table: above,
     } in layers
     {
-        merge(&mut table, above, "");
-        config = table
-            .clone()
-            .try_into()
-            .map_err(|error: toml::de::Error| ConfigError::Layer {
-                origin: origin.clone(),
-                message: error.to_string().trim_end().replace('\n', " "),
-            })?;
-        // A model without fields takes any key without a word: what does not come back out was not understood.
-        if let Some(key) = missing(&table, &Table::try_from(&config)?, "") {
-            return Err(ConfigError::UnknownKey {
-                origin: origin.clone(),
-                key,
-            });
+        if let Some(named) = above.get("model").and_then(|model| model.get("kind"))
+            && named.as_str() != Some(kind.name())
+        {
+            let other = find_kind(named, origin)?;
+            table.retain(|key, _| !kind.defaults().contains_key(key));
+            table.extend(other.defaults());
+            kind = other;
         }
-        last = origin;
+        let mut above = above.clone();
+        kind.rename_former_keys(&mut above);
+        merge(&mut table, &above, "");
+        read = Some(parse_layer(&table, &*kind, origin)?);
+        own.push((origin, above));
     }
-    config.validate().map_err(|cause| ConfigError::Value {
-        origin: last.into(),
-        cause,
+    let mut config = match read {
+        Some(config) => config,
+        None => parse_layer(&table, &*kind, "the defaults")?,
+    };
+    config.validate().map_err(|cause| {
+        let brings = |(_, table): &&(&String, Table)| has(table, &cause.key);
+        let layer = own.iter().rev().find(brings).or(own.last());
+        ConfigError::Value {
+            origin: layer.map_or("the defaults".into(), |(origin, _)| (*origin).clone()),
+            cause,
+        }
     })?;
     // A budget is over any model; what it says of a part that this one lacks makes no other experiment of it.
-    if !config.model.has_transformers() {
-        config.optimiser.transformer_learning_rate = None;
+    let groups = config.model.rate_groups();
+    config
+        .optimiser
+        .rates
+        .retain(|group, _| groups.contains(&group.as_str()));
+    if let Some(validation) = &mut config.validation
+        && validation.lengths.is_none()
+    {
+        let protocol = config
+            .model
+            .protocol(&config.data, &EvaluationOptions::default());
+        let lengths = protocol.lengths();
+        validation.lengths = (!lengths.is_empty()).then(|| lengths.to_vec());
     }
     Ok(config)
+}
+
+fn no_kinds() -> ConfigError {
+    ConfigError::Layer {
+        origin: "the registry".into(),
+        message: "knows no kind of model".into(),
+    }
+}
+
+fn find_kind(named: &Value, origin: &str) -> Result<Arc<dyn ModelKind>, ConfigError> {
+    let found = named.as_str().and_then(registry::find);
+    found.ok_or_else(|| {
+        let kinds = registry::kinds();
+        let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+        ConfigError::Layer {
+            origin: origin.into(),
+            message: format!(
+                "model.kind = {named}: there is no such kind of model; known are {}",
+                names.join(", ")
+            ),
+        }
+    })
+}
+
+/// The config that a merged table describes; `origin` is the layer that was merged last.
+fn parse_layer(
+    table: &Table,
+    kind: &dyn ModelKind,
+    origin: &str,
+) -> Result<ExperimentConfig, ConfigError> {
+    let unread = |error: toml::de::Error| ConfigError::Layer {
+        origin: origin.into(),
+        message: error.to_string().trim_end().replace('\n', " "),
+    };
+    let own = kind.defaults();
+    let (own, mut shared): (Table, Table) = table
+        .clone()
+        .into_iter()
+        .partition(|(key, _)| own.contains_key(key));
+    let name = kind.default_name();
+    shared
+        .entry("name")
+        .or_insert_with(|| Value::String(name.into()));
+    let Shared {
+        name,
+        seed,
+        data,
+        optimiser,
+        checkpoint,
+        log,
+        validation,
+    } = shared.try_into().map_err(unread)?;
+    let config = ExperimentConfig {
+        name,
+        seed,
+        data,
+        model: kind.read(own).map_err(unread)?,
+        optimiser,
+        checkpoint,
+        log,
+        validation,
+    };
+    // A model without fields takes any key without a word: what does not come back out was not understood.
+    match missing(table, &config.to_table()?, "") {
+        Some(key) => Err(ConfigError::UnknownKey {
+            origin: origin.into(),
+            key,
+        }),
+        None => Ok(config),
+    }
+}
+
+/// Whether a layer gives the dotted key.
+fn has(table: &Table, key: &str) -> bool {
+    match key.split_once('.') {
+        None => table.contains_key(key),
+        Some((first, rest)) => match table.get(first) {
+            Some(Value::Table(inner)) => has(inner, rest),
+            _ => false,
+        },
+    }
+}
+
+impl PartialEq for ExperimentConfig {
+    fn eq(&self, other: &Self) -> bool {
+        matches!((self.to_table(), other.to_table()), (Ok(ours), Ok(theirs)) if ours == theirs)
+    }
+}
+
+impl Default for ExperimentConfig {
+    /// What an empty file describes: the first model of the registry with the defaults of every key.
+    ///
+    /// # Panics
+    /// Where the registry is empty.
+    fn default() -> Self {
+        resolve(&[]).expect("the defaults are a config")
+    }
 }
 
 fn merge(below: &mut Table, above: &Table, key: &str) {
@@ -322,8 +465,8 @@ fn missing(given: &Table, understood: &Table, key: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::data::Split;
-    use crate::experiment::layers::*;
     use std::fs;
 
     fn load(files: &[(&str, &str)], sets: &[&str]) -> Result<ExperimentConfig, String> {

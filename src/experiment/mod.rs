@@ -1,10 +1,7 @@
 //! Experiments: configs in layers.
 
 pub mod config;
-pub(crate) mod layers;
+mod layers;
 
-pub use config::{
-    AugmentationConfig, CheckpointConfig, ExperimentConfig, LogConfig, ScheduleConfig,
-    ScheduledSamplingConfig, ValueError,
-};
+pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
 pub use layers::ConfigError;

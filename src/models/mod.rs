@@ -1,13 +1,29 @@
 //! Models: one folder a paper, and the one list of them.
+//!
+//! - [`task`]: what training asks of a model;
+//! - [`generator`]: what a user, an evaluation or `generate` may ask of one;
+//! - [`settings`]: what the commands ask of a kind of model;
+//! - [`registry`]: the list of kinds;
+//! - [`transition`]: what the models of transitions between two keyframes share.
 
+#[cfg(feature = "papers")]
 pub mod baselines;
+pub mod generator;
+#[cfg(feature = "papers")]
 pub mod harvey2020;
+#[cfg(feature = "papers")]
 pub mod pan2021;
 pub mod registry;
+pub mod settings;
+mod statistics;
 pub mod streams;
+pub mod task;
+#[cfg(feature = "papers")]
 pub mod transition;
 pub mod weights;
 
-pub use registry::ModelConfig;
+pub use generator::{Generator, ModelError, Motion, Request};
+pub use settings::{ModelKind, ModelSettings, Paper, TaskSetting};
+pub use statistics::Statistics;
 pub use streams::Streams;
-pub use transition::{LossTerms, ModelError};
+pub use task::{CRITICS, LossTerms, Step, Task};

@@ -18,34 +18,14 @@ impl Streams {
         Self { seed }
     }
 
+    /// What all of them follow from.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// Initial values of the weights.
     pub fn initialisation(&self) -> ChaCha8Rng {
         self.stream("initialisation", &[])
-    }
-
-    /// Choice and order of the windows of an epoch.
-    pub fn shuffling(&self, epoch: usize) -> ChaCha8Rng {
-        self.stream("shuffling", &[epoch as u64])
-    }
-
-    /// The draw between ground truth and predictions at a step.
-    pub fn sampling(&self, step: u64) -> ChaCha8Rng {
-        self.stream("sampling", &[step])
-    }
-
-    /// Which windows of a step's batch are seen in a mirror.
-    pub fn mirroring(&self, step: u64) -> ChaCha8Rng {
-        self.stream("mirroring", &[step])
-    }
-
-    /// At which tempi a step's windows are seen.
-    pub fn tempi(&self, step: u64) -> ChaCha8Rng {
-        self.stream("tempi", &[step])
-    }
-
-    /// The frames that a step trains one by one.
-    pub fn single_frames(&self, step: u64) -> ChaCha8Rng {
-        self.stream("single_frames", &[step])
     }
 
     /// Key of the dropout masks of a shard at a step.
@@ -53,7 +33,8 @@ impl Streams {
         self.stream("dropout", &[step, shard as u64]).next_u64()
     }
 
-    fn stream(&self, name: &str, indices: &[u64]) -> ChaCha8Rng {
+    /// The stream of this name and these indices, such as the shuffling of an epoch: each model names its own.
+    pub fn stream(&self, name: &str, indices: &[u64]) -> ChaCha8Rng {
         let mut hash = Sha256::new();
         hash.update(self.seed.to_le_bytes());
         // The length keeps a name and its indices apart.
@@ -68,7 +49,7 @@ impl Streams {
 
 #[cfg(test)]
 mod tests {
-    use crate::models::streams::*;
+    use super::*;
     use std::collections::HashSet;
 
     #[test]
@@ -78,13 +59,11 @@ mod tests {
             let streams = Streams::new(seed);
             assert!(firsts.insert(streams.initialisation().next_u64()));
             for index in 0..4 {
-                assert!(firsts.insert(streams.shuffling(index).next_u64()));
-                assert!(firsts.insert(streams.sampling(index as u64).next_u64()));
-                assert!(firsts.insert(streams.mirroring(index as u64).next_u64()));
-                assert!(firsts.insert(streams.tempi(index as u64).next_u64()));
-                assert!(firsts.insert(streams.single_frames(index as u64).next_u64()));
+                for name in ["shuffling", "sampling", "mirroring"] {
+                    assert!(firsts.insert(streams.stream(name, &[index]).next_u64()));
+                }
                 for shard in 0..4 {
-                    assert!(firsts.insert(streams.dropout(index as u64, shard)));
+                    assert!(firsts.insert(streams.dropout(index, shard)));
                 }
             }
         }

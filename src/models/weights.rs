@@ -1,5 +1,5 @@
-//! Weights as a safetensors file that PyTorch loads: every parameter by its name in f32, what standardises the features
-//! (`feature_mean [154]`, `feature_std [154]`, `position_scale [1]`, `velocity_scale [1]`), and the config.
+//! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32, the statistics that the
+//! model needs beside them, and the config.
 //!
 //! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program that wrote the file).
 
@@ -12,19 +12,14 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-use super::transition::Standardisation;
+use super::Statistics;
 use crate::autograd::Parameters;
 use crate::data::hexadecimal;
-use crate::motion::features::FEATURES;
 use crate::nn::MOST_WEIGHTS;
 
 const METADATA: &str = "keydance";
 /// Bytes that a weights file may have beside its weights: config, names, shapes, statistics.
 const LARGEST_HEADER: u64 = 1 << 24;
-const MEAN: &str = "feature_mean";
-const STD: &str = "feature_std";
-const POSITION_SCALE: &str = "position_scale";
-const VELOCITY_SCALE: &str = "velocity_scale";
 
 /// Why a file does not give the weights of a model.
 #[derive(Debug, Error)]
@@ -91,8 +86,7 @@ pub struct SavedWeights {
     pub config: String,
     /// Version of keydance that wrote the file.
     pub version: String,
-    pub standardisation: Standardisation,
-    parameters: BTreeMap<String, ArrayD<f32>>,
+    arrays: BTreeMap<String, ArrayD<f32>>,
 }
 
 /// The content of a weights file; the same bytes for the same weights.
@@ -101,23 +95,17 @@ pub struct SavedWeights {
 /// A header beyond the format's limits.
 pub fn to_safetensors(
     parameters: &Parameters<f32>,
-    standardisation: &Standardisation,
+    statistics: &Statistics,
     config: &str,
 ) -> Result<Vec<u8>, WeightsError> {
-    let single = |values: &[f64]| -> Vec<f32> { values.iter().map(|&x| x as f32).collect() };
-    let statistics = [
-        (MEAN, single(&standardisation.mean)),
-        (STD, single(&standardisation.std)),
-        (POSITION_SCALE, single(&[standardisation.position_scale])),
-        (VELOCITY_SCALE, single(&[standardisation.velocity_scale])),
-    ];
+    let single = |array: &ArrayD<f64>| bytes(array.iter().map(|&x| x as f32));
     let tensors: Vec<(&str, Vec<usize>, Vec<u8>)> = parameters
-        .iter()
-        .map(|(name, value)| (name, value.shape().to_vec(), bytes(value.iter())))
+        .saved()
+        .map(|(name, value)| (name, value.shape().to_vec(), bytes(value.iter().copied())))
         .chain(
             statistics
                 .iter()
-                .map(|(name, values)| (*name, vec![values.len()], bytes(values.iter()))),
+                .map(|(name, array)| (name, array.shape().to_vec(), single(array))),
         )
         .collect();
     let views = tensors
@@ -134,16 +122,16 @@ pub fn to_safetensors(
     Ok(safetensors::serialize(views, Some(metadata))?)
 }
 
-fn bytes<'a>(values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
-    values.flat_map(|x| x.to_le_bytes()).collect()
+fn bytes(values: impl Iterator<Item = f32>) -> Vec<u8> {
+    values.flat_map(f32::to_le_bytes).collect()
 }
 
-/// SHA-256 over names, shapes and values of all parameters, hexadecimal.
+/// SHA-256 over names, shapes and values of all parameters and buffers, hexadecimal.
 pub fn digest(parameters: &Parameters<f32>) -> String {
     let mut hash = Sha256::new();
-    for (name, value) in parameters.iter() {
+    for (name, value) in parameters.saved() {
         hash.update(format!("{name} {:?}\n", value.shape()));
-        hash.update(bytes(value.iter()));
+        hash.update(bytes(value.iter().copied()));
     }
     hexadecimal(&hash.finalize())
 }
@@ -197,72 +185,70 @@ impl SavedWeights {
         let Metadata { config, version } = serde_json::from_str(metadata)
             .map_err(|error| foreign(format!("its metadata entry {METADATA:?}: {error}")))?;
         let tensors = SafeTensors::deserialize(content).map_err(damaged)?;
-        let mut parameters = BTreeMap::new();
+        let mut arrays = BTreeMap::new();
         for (name, view) in tensors.iter() {
-            parameters.insert(name.to_string(), array(path, name, &view)?);
+            arrays.insert(name.to_string(), array(path, name, &view)?);
         }
-        let mut take = |name: &str, len: usize| -> Result<Vec<f64>, WeightsError> {
-            let missing = WeightsError::Missing {
-                path: path.into(),
-                name: name.into(),
-                expected: vec![len],
-            };
-            let array = parameters.remove(name).ok_or(missing)?;
-            check_shape(path, name, array.shape(), &[len])?;
-            Ok(array.iter().map(|&x| f64::from(x)).collect())
-        };
-        let standardisation = Standardisation {
-            mean: take(MEAN, FEATURES)?,
-            std: take(STD, FEATURES)?,
-            position_scale: take(POSITION_SCALE, 1)?[0],
-            velocity_scale: take(VELOCITY_SCALE, 1)?[0],
-        };
-        check_values(path, &standardisation)?;
         Ok(Self {
             path: path.into(),
             config,
             version,
-            standardisation,
-            parameters,
+            arrays,
         })
+    }
+
+    /// One of the model's [`Statistics`]; `expected` is its shape.
+    ///
+    /// # Errors
+    /// It is not there, or has another shape.
+    pub fn statistic(&self, name: &str, expected: &[usize]) -> Result<ArrayD<f64>, WeightsError> {
+        let array = self.array(name, expected)?;
+        Ok(array.mapv(f64::from))
+    }
+
+    fn array(&self, name: &str, expected: &[usize]) -> Result<&ArrayD<f32>, WeightsError> {
+        let missing = || WeightsError::Missing {
+            path: self.path.clone(),
+            name: name.into(),
+            expected: expected.to_vec(),
+        };
+        let array = self.arrays.get(name).ok_or_else(missing)?;
+        check_shape(&self.path, name, array.shape(), expected)?;
+        Ok(array)
     }
 
     /// Most weights that a model may have to be built for these: not many more than there are, as the sizes in a file cannot be
     /// trusted; but some, so that a parameter which the file lacks is named.
     pub fn most_weights(&self) -> usize {
-        let weights: usize = self.parameters.values().map(ArrayD::len).sum();
+        let weights: usize = self.arrays.values().map(ArrayD::len).sum();
         2 * weights + (1 << 20)
     }
 
-    /// Puts the values into a model's parameters.
+    /// Puts the values into a model's parameters and buffers. `statistics` are what else the file may hold.
     ///
     /// # Errors
     /// The file and the model do not have the same names and shapes; then nothing is changed.
-    pub fn load_into(&self, parameters: &mut Parameters<f32>) -> Result<(), WeightsError> {
-        for (name, value) in parameters.iter() {
-            let found = self
-                .parameters
-                .get(name)
-                .ok_or_else(|| WeightsError::Missing {
-                    path: self.path.clone(),
-                    name: name.into(),
-                    expected: value.shape().to_vec(),
-                })?;
-            check_shape(&self.path, name, found.shape(), value.shape())?;
+    pub fn load_into(
+        &self,
+        parameters: &mut Parameters<f32>,
+        statistics: &Statistics,
+    ) -> Result<(), WeightsError> {
+        for (name, value) in parameters.saved() {
+            self.array(name, value.shape())?;
         }
-        let unknown = self
-            .parameters
-            .iter()
-            .find(|(name, _)| !parameters.iter().any(|(known, _)| known == *name));
-        if let Some((name, value)) = unknown {
+        let known = |name: &str| {
+            parameters.saved().any(|(known, _)| known == name)
+                || statistics.iter().any(|(known, _)| known == name)
+        };
+        if let Some((name, value)) = self.arrays.iter().find(|(name, _)| !known(name)) {
             return Err(WeightsError::Unknown {
                 path: self.path.clone(),
                 name: name.clone(),
                 found: value.shape().to_vec(),
             });
         }
-        for (name, value) in parameters.values_mut() {
-            if let Some(saved) = self.parameters.get(name) {
+        for (name, value) in parameters.saved_mut() {
+            if let Some(saved) = self.arrays.get(name) {
                 value.assign(saved);
             }
         }
@@ -304,36 +290,5 @@ fn check_shape(
             found: format!("{found:?}"),
             expected: format!("{expected:?}"),
         })
-    }
-}
-
-fn check_values(path: &Path, statistics: &Standardisation) -> Result<(), WeightsError> {
-    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
-    let positive = |values: &[f64]| finite(values) && values.iter().all(|&x| x > 0.0);
-    let checks = [
-        (MEAN, finite(&statistics.mean), "has a NaN or an infinity"),
-        (
-            STD,
-            positive(&statistics.std),
-            "has a number that is not above 0",
-        ),
-        (
-            POSITION_SCALE,
-            positive(&[statistics.position_scale]),
-            "is not above 0",
-        ),
-        (
-            VELOCITY_SCALE,
-            positive(&[statistics.velocity_scale]),
-            "is not above 0",
-        ),
-    ];
-    match checks.into_iter().find(|(_, valid, _)| !valid) {
-        None => Ok(()),
-        Some((name, _, problem)) => Err(WeightsError::Value {
-            path: path.into(),
-            name,
-            problem,
-        }),
     }
 }

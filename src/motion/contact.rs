@@ -9,7 +9,7 @@ use super::features::CONTACTS;
 pub const FOOT_JOINTS: [usize; 4] = [3, 4, 7, 8];
 
 /// A foot joint is in contact where its label is above this.
-const CONTACT_LABEL: f64 = 0.5;
+pub const CONTACT_LABEL: f64 = 0.5;
 
 /// Which foot joints are in contact by the labels of a frame, in the order of [`FOOT_JOINTS`].
 ///

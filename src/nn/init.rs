@@ -3,7 +3,7 @@
 use ndarray::{ArrayD, IxDyn};
 use rand::{Rng, RngExt};
 
-use crate::autograd::{BlockId, ParameterId, Parameters, Real};
+use crate::autograd::{BlockId, BufferId, ParameterId, Parameters, Real};
 
 /// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and memory would end first.
 pub const MOST_WEIGHTS: usize = 1 << 28;
@@ -65,6 +65,12 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
     ) -> (ParameterId, BlockId) {
         let value = ArrayD::from_elem(self.admit(shape), T::from_f64(value));
         self.parameters.add(name, value)
+    }
+
+    /// A buffer, such as a running mean: saved with the weights, moved by no gradient.
+    pub fn buffer(&mut self, name: String, shape: &[usize], value: f64) -> BufferId {
+        let value = ArrayD::from_elem(self.admit(shape), T::from_f64(value));
+        self.parameters.add_buffer(name, value)
     }
 
     /// A block of a parameter's rows.

@@ -8,6 +8,8 @@
 //! w <- w - learning_rate / (1 - beta1^t) * m / (sqrt(v) / sqrt(1 - beta2^t) + epsilon)
 //! ```
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -20,14 +22,15 @@ use crate::autograd::{Gradients, Parameters, Real};
 const CHUNK: usize = 1 << 14;
 
 /// Adam's settings; the defaults are the paper's and, where it is silent, PyTorch's.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AdamConfig {
     /// The rate, or where it has a schedule the highest.
     pub learning_rate: f64,
-    /// The same for the weights of Transformers, which a large rate switches off (docs/model.md). Left out: `learning_rate`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub transformer_learning_rate: Option<f64>,
+    /// Rates of their own of groups of weights that the model names, such as `{ transformers = 1e-4 }`; others have
+    /// `learning_rate`. They follow the same schedule.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub rates: BTreeMap<String, f64>,
     /// Decay of the mean of gradients.
     pub beta1: f64,
     /// Decay of the mean of squared gradients.
@@ -51,9 +54,10 @@ impl AdamConfig {
         }
     }
 
-    /// The rate of the weights of Transformers over that of the others, the same at every step.
-    fn transformer_share(&self) -> f64 {
-        self.transformer_learning_rate
+    /// The rate of a group of weights over that of the others, the same at every step.
+    fn share_of(&self, group: Option<&str>) -> f64 {
+        group
+            .and_then(|group| self.rates.get(group))
             .map_or(1.0, |rate| rate / self.learning_rate)
     }
 }
@@ -62,7 +66,7 @@ impl Default for AdamConfig {
     fn default() -> Self {
         Self {
             learning_rate: 1e-4,
-            transformer_learning_rate: None,
+            rates: BTreeMap::new(),
             beta1: 0.9,
             beta2: 0.999,
             epsilon: 1e-8,
@@ -105,12 +109,12 @@ struct Factors<T> {
 }
 
 impl<T: Real> Adam<T> {
-    /// Moments of zero for every parameter. `in_transformer` says of a parameter's name whether it is a Transformer's, see
-    /// [`AdamConfig::transformer_learning_rate`].
-    pub fn new(
+    /// Moments of zero for every parameter. `rate_group` says of a parameter's name which of [`AdamConfig::rates`] is its
+    /// own.
+    pub fn new<'g>(
         config: AdamConfig,
         parameters: &Parameters<T>,
-        in_transformer: impl Fn(&str) -> bool,
+        rate_group: impl Fn(&str) -> Option<&'g str>,
     ) -> Self {
         let zeros = || -> Vec<Vec<T>> {
             parameters
@@ -118,14 +122,12 @@ impl<T: Real> Adam<T> {
                 .map(|(_, value)| vec![T::zero(); value.len()])
                 .collect()
         };
-        let share = |name: &str| match in_transformer(name) {
-            true => config.transformer_share(),
-            false => 1.0,
-        };
+        let share = |name: &str| config.share_of(rate_group(name));
+        let shares = parameters.iter().map(|(name, _)| share(name)).collect();
         Self {
             config,
             steps: 0,
-            shares: parameters.iter().map(|(name, _)| share(name)).collect(),
+            shares,
             first: zeros(),
             second: zeros(),
         }
@@ -381,7 +383,7 @@ mod tests {
             ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6)
         };
         let mut parameters = parameters::<f64>(&[&start]);
-        let mut adam = Adam::new(config, &parameters, |_| false);
+        let mut adam = Adam::new(config, &parameters, |_| None);
         for t in 0..20 {
             // Two shards that add up to the gradient.
             let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
@@ -408,7 +410,7 @@ mod tests {
     fn a_constant_gradient_moves_a_weight_by_the_learning_rate_a_step() {
         // With g constant both corrected moments are exact: every step is rate * g / (|g| + eps).
         let mut parameters = parameters::<f32>(&[&[1.0, 2.0, 3.0]]);
-        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| false);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
         for _ in 0..5 {
             let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
             adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
@@ -420,15 +422,17 @@ mod tests {
     }
 
     #[test]
-    fn the_weights_of_transformers_have_their_own_rate() {
+    fn a_group_of_weights_has_a_rate_of_its_own() {
         let config = AdamConfig {
             learning_rate: 1e-3,
-            transformer_learning_rate: Some(2e-4),
+            rates: BTreeMap::from([("slow".into(), 2e-4)]),
             ..AdamConfig::default()
         };
         let start = [1.0, -2.0];
         let mut both = parameters::<f64>(&[&start, &start]);
-        let mut adam = Adam::new(config, &both, |name| name == "p1");
+        let mut adam = Adam::new(config.clone(), &both, |name| {
+            (name == "p1").then_some("slow")
+        });
         // Half the rate of the config, as a schedule has it.
         for t in 0..5 {
             let gradients = gradients(&both, |_, i| (i + t) as f64 - 1.5);
@@ -436,7 +440,7 @@ mod tests {
         }
         for (k, rate) in [5e-4, 1e-4].into_iter().enumerate() {
             let mut alone = parameters::<f64>(&[&start]);
-            let mut adam = Adam::new(config, &alone, |_| false);
+            let mut adam = Adam::new(config.clone(), &alone, |_| None);
             for t in 0..5 {
                 let gradients = gradients(&alone, |_, i| (i + t) as f64 - 1.5);
                 adam.step(&mut alone, &mut [gradients], rate).unwrap();
@@ -456,18 +460,18 @@ mod tests {
         };
         let free = AdamConfig {
             clip_norm: None,
-            ..clipped
+            ..clipped.clone()
         };
         let run = |config, scale: f64| {
             let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
-            let mut adam = Adam::new(config, &parameters, |_| false);
+            let mut adam = Adam::new(config, &parameters, |_| None);
             let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
             let norm = adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
             (norm, weights(&parameters))
         };
-        let (norm, long) = run(clipped, 1.0);
+        let (norm, long) = run(clipped.clone(), 1.0);
         assert!((norm - 5.0).abs() < 1e-12);
-        let scaled = run(free, 0.2).1;
+        let scaled = run(free.clone(), 0.2).1;
         assert!(
             long.iter().zip(&scaled).all(|(a, b)| (a - b).abs() < 1e-9),
             "{long:?} {scaled:?}"
@@ -478,7 +482,7 @@ mod tests {
     #[test]
     fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
         let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
-        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| false);
+        let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
         let before = (weights(&parameters), adam.clone());
         for bad in [f64::NAN, f64::INFINITY] {
             let gradients = gradients(
@@ -508,7 +512,7 @@ mod tests {
                     ..AdamConfig::default()
                 },
                 &parameters,
-                |_| false,
+                |_| None,
             );
             for t in 0..3 {
                 let mut shards: Vec<_> = (0..4)

@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 
 use super::checkpoint::{self, WEIGHTS_FILE};
 use super::durable::{self, FileError};
+use super::error::RunError;
 use super::lock::FolderLock;
 use super::log::{self, LogLine};
 use super::manifest::{self, Build, Manifest};
-use crate::experiment::config::ExperimentConfig;
-use crate::training::error::TrainingError;
+use crate::experiment::ExperimentConfig;
 
 const MANIFEST: &str = "manifest.json";
 const LOG: &str = "log.jsonl";
@@ -42,7 +42,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// The folder holds a run already, another training writes to it, or it cannot be written.
-    pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+    pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         run.begin(config)?;
         Ok(run)
@@ -52,7 +52,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// The folder holds a run of another name, another training writes to it, or it cannot be written.
-    pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+    pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         if run.config_path().exists() && run.config()?.name == config.name {
             checkpoint::remove(&run.checkpoints())?;
@@ -73,7 +73,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// The run there has another config, another training writes to it, or it cannot be read or written.
-    pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, TrainingError> {
+    pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         if !run.config_path().exists() {
             run.begin(config)?;
@@ -92,7 +92,7 @@ impl RunFolder {
         }
     }
 
-    fn locked(path: &Path) -> Result<Self, TrainingError> {
+    fn locked(path: &Path) -> Result<Self, RunError> {
         fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
         Ok(Self {
             path: path.into(),
@@ -100,25 +100,25 @@ impl RunFolder {
         })
     }
 
-    fn begin(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+    fn begin(&self, config: &ExperimentConfig) -> Result<(), RunError> {
         let path = &self.path;
         if [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE]
             .iter()
             .any(|name| path.join(name).exists())
         {
-            return Err(TrainingError::RunExists { path: path.into() });
+            return Err(RunError::RunExists { path: path.into() });
         }
         durable::replace(&path.join(Self::CONFIG), config.to_toml()?.as_bytes())?;
         Ok(())
     }
 
     /// Refuses a config that differs from the run's.
-    fn check_config(&self, config: &ExperimentConfig) -> Result<(), TrainingError> {
+    fn check_config(&self, config: &ExperimentConfig) -> Result<(), RunError> {
         let differences = self.config()?.differences(config)?;
         if differences.is_empty() {
             Ok(())
         } else {
-            Err(TrainingError::OtherConfig {
+            Err(RunError::OtherConfig {
                 path: self.config_path(),
                 differences,
             })
@@ -153,7 +153,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// It cannot be read, or this version does not know one of its keys.
-    pub fn config(&self) -> Result<ExperimentConfig, TrainingError> {
+    pub fn config(&self) -> Result<ExperimentConfig, RunError> {
         ExperimentConfig::load(&self.config_path(), &[])
             .map_err(|error| self.or_other_version(error.into()))
     }
@@ -167,7 +167,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// It cannot be read or holds something else.
-    pub fn log(&self) -> Result<Vec<LogLine>, TrainingError> {
+    pub fn log(&self) -> Result<Vec<LogLine>, RunError> {
         log::read(&self.log_path())
     }
 
@@ -175,19 +175,19 @@ impl RunFolder {
     ///
     /// # Errors
     /// It cannot be read, is none, or is of a newer version of the program.
-    pub fn manifest(&self) -> Result<Option<Manifest>, TrainingError> {
+    pub fn manifest(&self) -> Result<Option<Manifest>, RunError> {
         let path = self.manifest_path();
         if !path.exists() {
             return Ok(None);
         }
         let text = fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
-        let read = serde_json::from_str(&text).map_err(|cause| TrainingError::Manifest {
+        let read = serde_json::from_str(&text).map_err(|cause| RunError::Manifest {
             path: path.clone(),
             cause,
         });
         let read = read.and_then(|manifest: Manifest| match manifest.format {
             ..=manifest::FORMAT => Ok(manifest),
-            found => Err(TrainingError::ManifestFormat {
+            found => Err(RunError::ManifestFormat {
                 path,
                 found,
                 newest: manifest::FORMAT,
@@ -200,10 +200,10 @@ impl RunFolder {
     }
 
     /// The error, with the version of the program that made the run where it is another one.
-    pub(crate) fn or_other_version(&self, error: TrainingError) -> TrainingError {
+    pub(crate) fn or_other_version(&self, error: RunError) -> RunError {
         let text = fs::read_to_string(self.path.join(MANIFEST)).unwrap_or_default();
         match serde_json::from_str::<Build>(&text) {
-            Ok(made_by) if made_by != Build::this() => TrainingError::OtherVersion {
+            Ok(made_by) if made_by != Build::this() => RunError::OtherVersion {
                 path: self.path.clone(),
                 made_by: made_by.to_string(),
                 this: Build::this().to_string(),
@@ -213,13 +213,12 @@ impl RunFolder {
         }
     }
 
-    pub(crate) fn write_manifest(&self, manifest: &Manifest) -> Result<(), TrainingError> {
+    pub(crate) fn write_manifest(&self, manifest: &Manifest) -> Result<(), RunError> {
         let path = self.manifest_path();
-        let mut text =
-            serde_json::to_vec_pretty(manifest).map_err(|cause| TrainingError::Manifest {
-                path: path.clone(),
-                cause,
-            })?;
+        let mut text = serde_json::to_vec_pretty(manifest).map_err(|cause| RunError::Manifest {
+            path: path.clone(),
+            cause,
+        })?;
         text.push(b'\n');
         Ok(durable::replace(&path, &text)?)
     }

@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use super::durable::FileError;
-use crate::training::error::TrainingError;
+use super::error::RunError;
 
 /// The file that a training holds locked while it writes to the folder. It stays there: only the lock counts, and that ends with
 /// the process, however it ends.
@@ -23,12 +23,12 @@ impl FolderLock {
     ///
     /// # Errors
     /// Another training holds it, or it cannot be written.
-    pub fn take(folder: &Path) -> Result<Self, TrainingError> {
+    pub fn take(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(LOCK);
         let file = File::create(&path).map_err(FileError::at(&path, "created"))?;
         match file.try_lock() {
             Ok(()) => Ok(Self { _file: Some(file) }),
-            Err(TryLockError::WouldBlock) => Err(TrainingError::Locked {
+            Err(TryLockError::WouldBlock) => Err(RunError::Locked {
                 path: folder.into(),
             }),
             Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {

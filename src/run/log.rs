@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::durable::FileError;
-use crate::evaluation::Evaluation;
-use crate::training::error::TrainingError;
-use crate::training::step::StepReport;
+use super::error::RunError;
+use crate::evaluation::Scores;
+use crate::training::StepReport;
 
 /// Bytes at the end of a log that hold a whole line.
 const LAST_LINES: u64 = 1 << 14;
@@ -25,21 +25,21 @@ pub struct LogLine {
     pub losses: BTreeMap<String, f64>,
     /// Scores on validation clips after the step, where it was scored.
     #[serde(default)]
-    pub validation: Option<Evaluation>,
+    pub validation: Option<Scores>,
 }
 
 /// The lines of a log; none where there is none. A last line that a kill cut off is left out.
 ///
 /// # Errors
 /// The file cannot be read, or a line of it is no log line.
-pub(crate) fn read(path: &Path) -> Result<Vec<LogLine>, TrainingError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<LogLine>, RunError> {
     if !path.exists() {
         return Ok(Vec::new());
     }
     let text = std::fs::read_to_string(path).map_err(FileError::at(path, "read"))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let parse = |(index, line)| {
-        serde_json::from_str(line).map_err(|cause| TrainingError::Log {
+        serde_json::from_str(line).map_err(|cause| RunError::Log {
             path: path.into(),
             line: index + 1,
             cause,

@@ -4,11 +4,11 @@ use std::fmt;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
-use crate::data::{DanceClip, Dataset};
-use crate::experiment::config::ExperimentConfig;
-use crate::models::transition::DataRanges;
-use crate::models::transition::schedule::Schedule;
+use crate::data::{Dataset, Recording};
+use crate::experiment::ExperimentConfig;
+use crate::models::Task;
 
 /// Format of the manifest; raised when an older program would misread a newer one. Manifests from before it was written have 1.
 pub(crate) const FORMAT: u32 = 1;
@@ -76,19 +76,16 @@ pub struct Manifest {
     pub steps: u64,
     pub frame_steps_done: u64,
     pub frame_steps: u64,
-    /// Frames that the whole schedule predicts, of which schedule.fraction takes `frame_steps`.
-    #[serde(default)]
-    pub whole_schedule_frame_steps: Option<u64>,
     pub train: Part,
     pub test: Part,
     pub data_digest: String,
-    /// Bounds of the controls in the training clips; runs of earlier versions have none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub data_ranges: Option<DataRanges>,
     /// Weights in all parameters together.
     pub parameters: usize,
     /// SHA-256 of the weights (see [`crate::models::weights::digest`]), once finished.
     pub weights_digest: Option<String>,
+    /// What the task says of its schedule and the training data, see [`Task::facts`].
+    #[serde(flatten)]
+    pub facts: Map<String, Value>,
 }
 
 fn first_format() -> u32 {
@@ -103,20 +100,26 @@ pub struct Part {
 }
 
 impl Part {
-    fn of(clips: &[DanceClip]) -> Self {
+    fn of(clips: &[Recording]) -> Self {
         Self {
             clips: clips.len(),
-            frames: clips.iter().map(DanceClip::frames).sum(),
+            frames: clips.iter().map(Recording::frames).sum(),
         }
     }
 }
 
 impl Manifest {
+    /// One of the [facts](Manifest::facts); none where the run's version did not keep it.
+    pub fn fact<T: serde::de::DeserializeOwned>(&self, name: &str) -> Option<T> {
+        let value = self.facts.get(name)?.clone();
+        serde_json::from_value(value).ok()
+    }
+
     /// The manifest of a run that begins now.
     pub(crate) fn new(
         config: &ExperimentConfig,
         dataset: &Dataset,
-        schedule: &Schedule,
+        task: &dyn Task<f32>,
         parameters: usize,
         threads: usize,
     ) -> Self {
@@ -134,16 +137,15 @@ impl Manifest {
             finished: None,
             seconds: 0.0,
             steps_done: 0,
-            steps: schedule.steps(),
+            steps: task.steps(),
             frame_steps_done: 0,
-            frame_steps: schedule.frame_steps(),
-            whole_schedule_frame_steps: Some(schedule.whole_frame_steps()),
+            frame_steps: task.frame_steps(),
             train: Part::of(&dataset.train),
             test: Part::of(&dataset.test),
             data_digest: dataset.digest.clone(),
-            data_ranges: DataRanges::of(dataset.train.iter().map(|clip| clip.features.view())),
             parameters,
             weights_digest: None,
+            facts: task.facts(),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! A run's folder: config, manifest, log, checkpoints, weights, each there whole or not at all.
 
 pub mod checkpoint;
-pub(crate) mod durable;
-pub(crate) mod folder;
+mod durable;
+mod error;
+mod folder;
 mod lock;
 pub(crate) mod log;
 pub mod manifest;
@@ -12,6 +13,7 @@ mod trained_model;
 
 pub use durable::FileError;
 pub(crate) use durable::replace as replace_file;
+pub use error::RunError;
 pub use folder::RunFolder;
 pub use log::LogLine;
 pub use manifest::{Manifest, RunState};

@@ -142,7 +142,7 @@ pub fn decode(content: &[u8], path: &Path) -> Result<(Header, Moments), StateErr
 
 #[cfg(test)]
 mod tests {
-    use crate::run::state::*;
+    use super::*;
     use proptest::prelude::*;
 
     fn header() -> Header {

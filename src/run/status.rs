@@ -1,11 +1,11 @@
 //! How a run stands, from what lies in its folder.
 
 use super::checkpoint;
+use super::error::RunError;
 use super::folder::RunFolder;
 use super::lock::FolderLock;
 use super::log;
 use super::manifest::{Manifest, RunState};
-use crate::training::error::TrainingError;
 
 /// How a run stands at this moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// The manifest is damaged, or the folder cannot be read.
-    pub fn progress(&self) -> Result<Option<RunProgress>, TrainingError> {
+    pub fn progress(&self) -> Result<Option<RunProgress>, RunError> {
         let Some(manifest) = self.manifest()? else {
             return Ok(None);
         };

@@ -3,28 +3,25 @@
 use std::path::PathBuf;
 
 use super::checkpoint::{self, WEIGHTS_FILE};
+use super::error::RunError;
 use super::folder::RunFolder;
-use crate::autograd::Parameters;
-use crate::experiment::config::ExperimentConfig;
-use crate::models::streams::Streams;
-use crate::models::transition::TrainedModel;
+use crate::experiment::ExperimentConfig;
+use crate::models::Generator;
 use crate::models::weights::SavedWeights;
-use crate::nn::Initialiser;
-use crate::training::error::TrainingError;
 
 impl RunFolder {
     /// The newest weights of the run: those of its end, before it those of the newest checkpoint.
     ///
     /// # Errors
     /// The run has neither, or its checkpoints cannot be listed.
-    pub fn newest_weights(&self) -> Result<PathBuf, TrainingError> {
+    pub fn newest_weights(&self) -> Result<PathBuf, RunError> {
         let end = self.weights();
         if end.exists() {
             return Ok(end);
         }
         match checkpoint::list(&self.checkpoints())?.pop() {
             Some((_, newest)) => Ok(newest.join(WEIGHTS_FILE)),
-            None => Err(TrainingError::NoWeights {
+            None => Err(RunError::NoWeights {
                 path: self.path().into(),
             }),
         }
@@ -34,36 +31,35 @@ impl RunFolder {
     ///
     /// # Errors
     /// There are no weights, their file is damaged, or they are those of another model than `config` describes.
-    pub fn trained_model(&self, config: &ExperimentConfig) -> Result<TrainedModel, TrainingError> {
-        self.read_model(config)
+    pub fn trained_model(&self, config: &ExperimentConfig) -> Result<Box<dyn Generator>, RunError> {
+        let saved = self.saved_weights(config)?;
+        let model = config.model.trained(&config.name, &saved);
+        model.map_err(|error| self.or_other_version(error.into()))
+    }
+
+    /// The run's newest weights, for the model of `config`.
+    ///
+    /// # Errors
+    /// There are none, their file is damaged, or they are those of another model than `config` describes.
+    pub fn saved_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
+        self.read_weights(config)
             .map_err(|error| self.or_other_version(error))
     }
 
-    fn read_model(&self, config: &ExperimentConfig) -> Result<TrainedModel, TrainingError> {
+    fn read_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
         let path = self.newest_weights()?;
         let saved = SavedWeights::read(&path)?;
         let origin = format!("the config in {}", path.display());
         // Only the model's table concerns the weights.
-        let trained = ExperimentConfig {
-            model: ExperimentConfig::parse(&saved.config, &origin)?.model,
-            ..config.clone()
-        };
-        let differences = trained.training_differences(config)?;
-        if !differences.is_empty() {
-            return Err(TrainingError::OtherModel { path, differences });
+        let trained = ExperimentConfig::parse(&saved.config, &origin)?;
+        let differences: Vec<String> = trained
+            .training_differences(config)?
+            .into_iter()
+            .filter(|difference| difference.starts_with("model."))
+            .collect();
+        match differences.is_empty() {
+            true => Ok(saved),
+            false => Err(RunError::OtherModel { path, differences }),
         }
-        let mut parameters = Parameters::new();
-        let rng = Streams::new(config.seed).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = config.model.build(&mut init, &saved.standardisation)?;
-        saved.load_into(&mut parameters)?;
-        Ok(TrainedModel::new(
-            config.name.clone(),
-            network,
-            parameters,
-            saved.standardisation,
-            config.model.root_frame(),
-        )
-        .refining_velocities(config.model.refines_velocities()))
     }
 }

@@ -1,13 +1,14 @@
 //! What a sequence is made from: keyframes in time, the root trajectory, the velocity factors.
 
-use ndarray::{Array2, ArrayView2, s};
+use ndarray::{Array2, s};
 
 use super::SynthesisError;
 use super::controls::{rows_of, timed_curve};
 use super::retarget::{bones_of, retarget, with_constant_bones};
-use crate::data::DanceClip;
+use crate::models::transition::DanceClip;
+use crate::models::generator::{Given, Request};
+use crate::models::transition::KeyframePose;
 use crate::models::transition::window::wrap;
-use crate::models::transition::{KeyframePose, TransitionRequest};
 use crate::motion::features::{BODY_VELOCITIES, FACING, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::{PARTS, Skeleton};
 
@@ -150,7 +151,7 @@ impl SequenceRequest {
             .collect()
     }
 
-    /// Checks that the parts fit together; what concerns single transitions is checked by [`TransitionRequest::check`].
+    /// Checks that the parts fit together; what concerns single transitions is checked by the model that is asked.
     ///
     /// # Errors
     /// Fewer than two keyframes, times that do not ascend from 0, controls of another shape than `[F, 3]` and `[F, 5]`.
@@ -166,16 +167,30 @@ impl SequenceRequest {
         )
     }
 
-    /// The request for the transition to keyframe `index` (from 1 on) that starts from `start`, which stands at the keyframe before.
-    pub(crate) fn transition(&self, index: usize, start: KeyframePose) -> TransitionRequest {
-        let (from, to) = (&self.keyframes[index - 1], &self.keyframes[index]);
-        let rows = |of: ArrayView2<f64>| of.slice(s![from.time..=to.time, ..]).to_owned();
-        TransitionRequest {
+    /// The request for the frames from the first of these keyframes to the last, under the controls of the same frames.
+    ///
+    /// # Panics
+    /// Without keyframes.
+    pub(crate) fn piece(&self, keyframes: &[TimedKeyframe]) -> Request {
+        let (from, to) = (keyframes[0].time, keyframes[keyframes.len() - 1].time);
+        let rows = |of: &Array2<f64>| Some(of.slice(s![from..=to, ..]).to_owned());
+        let given = keyframes
+            .iter()
+            .map(|TimedKeyframe { time, keyframe }| Given {
+                frame: (time - from) as i64,
+                pose: keyframe.pose.clone(),
+                features: Some(keyframe.features.clone()),
+            });
+        Request {
             skeleton: self.skeleton.clone(),
-            start,
-            target: to.keyframe.clone(),
-            root_trajectory: rows(self.root_trajectory.view()),
-            velocity_factors: rows(self.velocity_factors.view()),
+            frame_time: self.frame_time,
+            frames: to - from + 1,
+            given: given.collect(),
+            root: rows(&self.root_trajectory),
+            velocity_factors: rows(&self.velocity_factors),
+            contacts: None,
+            music: None,
+            seed: 0,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From a request to motion: one transition after another.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use glam::DVec3;
 use ndarray::{Array2, s};
@@ -8,14 +9,17 @@ use ndarray::{Array2, s};
 use super::blend::{Start, Track, blend};
 use super::foot_cleanup::pin_feet;
 use super::{SequenceRequest, SynthesisError};
-use crate::models::transition::{KeyframePose, TransitionModel};
-use crate::motion::contact::{foot_skate, in_contact};
+use crate::models::generator::NeededPoses;
+use crate::models::transition::KeyframePose;
+use crate::models::{Generator, Motion};
+use crate::motion::contact::{CONTACT_LABEL, FOOT_JOINTS, foot_skate};
+use crate::motion::facing::facing_angles;
 use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
 use crate::motion::fit::fit_rotations;
-use crate::motion::placement::{vector, world_positions};
-use crate::motion::{Clip, JOINTS, Pose};
+use crate::motion::placement::vector;
+use crate::motion::{Clip, FeatureConfig, Pose};
 
 /// What is done to the predicted motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,8 +55,6 @@ pub struct Sequence {
     /// Features of `clip`, `[F, 149]`: o^r is the predicted angle, bent onto the keyframes; p^b (turned by it), p^r, v^b and v^r are measured on
     /// the poses; c is as predicted (0 to 1, clamped).
     pub features: Array2<f64>,
-    /// What the model predicted, before anything was done to it, `[F, 149]`; row 0 is the first keyframe.
-    pub predicted: Array2<f64>,
     /// Whether contact is predicted, `[F]` of LeftFoot, LeftToeBase, RightFoot, RightToeBase.
     pub contacts: Vec<[bool; 4]>,
     /// One for each keyframe but the first.
@@ -92,81 +94,47 @@ pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64,
     (mean, distances.iter().copied().fold(0.0, f64::max))
 }
 
-/// Generates the transitions of a request one after another, each from what was generated before it, and makes them one clip `name`.
+/// Generates the motion of a request and makes it one clip `name`.
 ///
-/// Each transition starts from the last frame of the one before after that was bent onto its keyframe; the features it starts from are
-/// measured on the bent motion.
+/// A model that fills the frames between two poses is asked for one transition after another, each from the last frame of the
+/// one before after that was bent onto its keyframe: the features it starts from are measured on the bent motion. Any other
+/// model is asked once, for all frames. Joint rotations are the model's own where it makes them, else fitted to its positions.
 ///
 /// # Errors
 /// The request does not fit together, the model fails, or predicts what no skeleton can take.
 pub fn synthesise(
-    model: &dyn TransitionModel,
+    model: &dyn Generator,
     request: &SequenceRequest,
     options: &SynthesisOptions,
     name: &str,
 ) -> Result<Sequence, SynthesisError> {
     request.check()?;
-    let mut motion = Motion::new(request);
-    let mut misses = Vec::new();
-    let mut fits = Vec::new();
-    for index in 1..request.keyframes.len() {
-        let (from, to) = (
-            request.keyframes[index - 1].time,
-            request.keyframes[index].time,
-        );
-        let mut asked = request.transition(index, motion.last());
-        // A model that has made a turn too many or too few is not asked for it back: the target counts its turns from there.
-        let before = &request.keyframes[index - 1].keyframe;
-        let turned = asked.start.features[FACING.start] - before.features[FACING.start];
-        asked.target.features[FACING.start] += (turned / TAU).round() * TAU;
-        let failed = |source| SynthesisError::Transition {
-            from,
-            to,
-            source: Box::new(source),
+    let mut motion = Made::new(request);
+    let last = request.keyframes.len() - 1;
+    let mut index = 0;
+    while index < last {
+        let end = match model.needs().poses {
+            NeededPoses::Ends => index + 1,
+            _ => last,
         };
-        let mut transitions = model
-            .transitions(std::slice::from_ref(&asked))
-            .map_err(failed)?;
-        let Some(transition) = transitions.pop() else {
-            let model = model.name().into();
-            return Err(SynthesisError::NoTransition { model });
-        };
-        transition.check(to - from).map_err(failed)?;
-        let frames = transition.frames;
-        let positions: Vec<_> = frames.rows().into_iter().map(world_positions).collect();
-        let fit = fit_rotations(
-            &request.skeleton,
-            &positions,
-            &asked.start.pose,
-            Some(&asked.target.pose),
-        )
-        .map_err(|source| SynthesisError::Rotations {
-            from,
-            to,
-            source: Box::new(source),
-        })?;
-        fits.push((positions.len(), fit.mean_error, fit.max_error));
-        misses.push(miss(
-            to,
-            &positions[positions.len() - 1],
-            request,
-            &asked.target,
-        ));
-        let mut track = Track {
-            poses: fit.poses,
-            facing: frames.column(FACING.start).to_vec(),
-        };
-        let facing = asked.target.features[FACING.start];
-        blend(&mut track, &motion.start(), &asked.target.pose, facing);
-        motion.append(track, &frames);
+        motion.make(model, index, end)?;
+        index = end;
     }
-    Ok(motion.finish(misses, &fits, options, name))
+    Ok(motion.finish(options, name))
+}
+
+/// World positions of a motion's joints, `[F][joints]`, cm.
+fn world_of(motion: &Motion) -> Vec<Vec<DVec3>> {
+    let frames = motion.positions.outer_iter();
+    frames
+        .map(|frame| frame.rows().into_iter().map(vector).collect())
+        .collect()
 }
 
 /// Distances of a predicted frame from the keyframe.
 fn miss(
     time: usize,
-    predicted: &[DVec3; JOINTS],
+    predicted: &[DVec3],
     request: &SequenceRequest,
     target: &KeyframePose,
 ) -> KeyframeMiss {
@@ -174,33 +142,114 @@ fn miss(
     let distances = predicted.iter().zip(wanted).map(|(a, b)| a.distance(b));
     KeyframeMiss {
         time,
-        mean: distances.clone().sum::<f64>() / JOINTS as f64,
+        mean: distances.clone().sum::<f64>() / predicted.len() as f64,
         max: distances.fold(0.0, f64::max),
     }
 }
 
 /// The motion as far as it has been generated.
-struct Motion<'r> {
+struct Made<'r> {
     request: &'r SequenceRequest,
     poses: Vec<Pose>,
     facing: Vec<f64>,
-    /// `[F, 149]`, as in [`Sequence::predicted`]; zeros in the frames to come.
-    predicted: Array2<f64>,
+    /// As predicted, `[F, 4]`; those of the frames to come are 0.
+    contacts: Array2<f64>,
+    misses: Vec<KeyframeMiss>,
+    /// Of each piece: number of frames, mean and largest error of the fitted rotations.
+    fits: Vec<(usize, f64, f64)>,
 }
 
-impl<'r> Motion<'r> {
+impl<'r> Made<'r> {
     fn new(request: &'r SequenceRequest) -> Self {
         let first = &request.keyframes[0].keyframe;
-        let mut predicted = Array2::zeros((request.frames(), FRAME));
-        predicted
+        let mut contacts = Array2::zeros((request.frames(), FOOT_JOINTS.len()));
+        contacts
             .row_mut(0)
-            .assign(&first.features.slice(s![..FRAME]));
+            .assign(&first.features.slice(s![CONTACTS]));
         Self {
             request,
             poses: vec![first.pose.clone()],
             facing: vec![first.features[FACING.start]],
-            predicted,
+            contacts,
+            misses: Vec::new(),
+            fits: Vec::new(),
         }
+    }
+
+    /// Makes the frames from keyframe `index`, which the motion has come to, to keyframe `end`.
+    fn make(
+        &mut self,
+        model: &dyn Generator,
+        index: usize,
+        end: usize,
+    ) -> Result<(), SynthesisError> {
+        let request = self.request;
+        let mut keyframes = request.keyframes[index..=end].to_vec();
+        let (from, to) = (keyframes[0].time, keyframes[end - index].time);
+        let start = self.last();
+        // A model that has made a turn too many or too few is not asked for it back: the targets count their turns from there.
+        let facing = FACING.start;
+        let turned = start.features[facing] - keyframes[0].keyframe.features[facing];
+        keyframes[0].keyframe = start;
+        for target in &mut keyframes[1..] {
+            target.keyframe.features[facing] += (turned / TAU).round() * TAU;
+        }
+        let failed = |source| SynthesisError::Transition {
+            from,
+            to,
+            source: Box::new(source),
+        };
+        let asked = request.piece(&keyframes);
+        let mut motions = model
+            .generate(std::slice::from_ref(&asked))
+            .map_err(failed)?;
+        let Some(motion) = motions.pop() else {
+            let model = model.name().into();
+            return Err(SynthesisError::NoTransition { model });
+        };
+        motion.check(&asked).map_err(failed)?;
+        let positions = world_of(&motion);
+        let poses = match motion.poses {
+            Some(poses) => poses[1..].to_vec(),
+            None => {
+                let fit = fit_rotations(
+                    &request.skeleton,
+                    &positions[1..],
+                    &keyframes[0].keyframe.pose,
+                    keyframes.last().map(|last| &last.keyframe.pose),
+                )
+                .map_err(|source| SynthesisError::Rotations {
+                    from,
+                    to,
+                    source: Box::new(source),
+                })?;
+                self.fits.push((to - from, fit.mean_error, fit.max_error));
+                fit.poses
+            }
+        };
+        let facing = match motion.facing {
+            Some(facing) => facing.to_vec(),
+            None => facing_angles(&positions, FeatureConfig::default().facing_sigma),
+        };
+        if let Some(contacts) = motion.contacts {
+            let rows = contacts.slice(s![1.., ..]);
+            self.contacts.slice_mut(s![from + 1..=to, ..]).assign(&rows);
+        }
+        for pair in keyframes.windows(2) {
+            let (first, last) = (pair[0].time - from, pair[1].time - from);
+            let target = &pair[1].keyframe;
+            self.misses
+                .push(miss(pair[1].time, &positions[last], request, target));
+            let mut track = Track {
+                poses: poses[first..last].to_vec(),
+                facing: facing[first + 1..=last].to_vec(),
+            };
+            let wanted = target.features[FACING.start];
+            blend(&mut track, &self.start(), &target.pose, wanted);
+            self.poses.extend(track.poses);
+            self.facing.extend(track.facing);
+        }
+        Ok(())
     }
 
     /// The last frame as the keyframe that the next transition starts from.
@@ -234,38 +283,27 @@ impl<'r> Motion<'r> {
         }
     }
 
-    /// The frames of a transition, with what was predicted for them.
-    fn append(&mut self, track: Track, frames: &Array2<f64>) {
-        let from = self.poses.len();
-        let mut rows = self
-            .predicted
-            .slice_mut(s![from..from + frames.nrows(), ..]);
-        rows.assign(frames);
-        self.poses.extend(track.poses);
-        self.facing.extend(track.facing);
-    }
-
-    /// Features of some frames, measured on the poses; the first of them takes its velocity from the first keyframe.
-    fn features(&self, range: std::ops::Range<usize>) -> Array2<f64> {
-        let mut rows = self.predicted.slice(s![range.clone(), ..]).to_owned();
+    /// Features of some frames, measured on the poses; the first of them keeps the velocity of the first keyframe.
+    fn features(&self, range: Range<usize>) -> Array2<f64> {
+        let first = &self.request.keyframes[0].keyframe.features;
+        let mut rows = Array2::zeros((range.len(), FRAME));
+        rows.row_mut(0).assign(&first.slice(s![..FRAME]));
         for (mut row, frame) in rows.rows_mut().into_iter().zip(range) {
             let positions = self.poses[frame].world_positions(&self.request.skeleton);
             write_positions(&mut row, &positions, self.facing[frame]);
-            row.slice_mut(s![CONTACTS])
-                .mapv_inplace(|label| label.clamp(0.0, 1.0));
+            let labels = self.contacts.row(frame).mapv(|label| label.clamp(0.0, 1.0));
+            row.slice_mut(s![CONTACTS]).assign(&labels);
         }
         write_velocities(&mut rows);
         rows
     }
 
-    fn finish(
-        mut self,
-        misses: Vec<KeyframeMiss>,
-        fits: &[(usize, f64, f64)],
-        options: &SynthesisOptions,
-        name: &str,
-    ) -> Sequence {
-        let contacts: Vec<[bool; 4]> = self.predicted.rows().into_iter().map(in_contact).collect();
+    fn finish(mut self, options: &SynthesisOptions, name: &str) -> Sequence {
+        let labels = self.contacts.rows().into_iter();
+        let contacts: Vec<[bool; 4]> = labels
+            .map(|row| std::array::from_fn(|foot| row[foot] > CONTACT_LABEL))
+            .collect();
+        let fits = &self.fits;
         let skeleton = &self.request.skeleton;
         let skate = |poses: &[Pose]| {
             let world: Vec<_> = poses
@@ -289,9 +327,9 @@ impl<'r> Motion<'r> {
             features: self.features(0..self.poses.len()),
             keyframes,
             contacts,
-            misses,
+            misses: self.misses,
             fit: FitError {
-                mean: sum / frames as f64,
+                mean: sum / frames.max(1) as f64,
                 max: fits.iter().fold(0.0, |max, &(.., worst)| max.max(worst)),
             },
             foot_skate: FootSkate { before, after },
@@ -301,7 +339,6 @@ impl<'r> Motion<'r> {
                 frame_time: self.request.frame_time,
                 poses: self.poses,
             },
-            predicted: self.predicted,
         }
     }
 }

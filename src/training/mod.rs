@@ -1,12 +1,19 @@
-//! Training: the loop over steps, and its end.
+//! Training: the loop over a task's steps.
+//!
+//! An [`ExperimentConfig`](crate::experiment::ExperimentConfig) and a data set make a [`Trainer`]. Its task says what each step
+//! trains; the shards of a step run on tapes of their own, and Adam moves the weights by the sum of their gradients. Everything
+//! that goes on is kept in a [`RunFolder`](crate::run::RunFolder), from which a training goes on to the bit.
 
-pub(crate) mod error;
+mod error;
 pub mod measure;
-pub(crate) mod step;
+mod record;
+mod report;
+mod resume;
+mod step;
 mod trainer;
-pub(crate) mod validation;
+mod validation;
 
 pub use error::TrainingError;
-pub use step::StepReport;
-pub use trainer::{Outcome, Resumed, Trainer};
-pub use validation::ValidationConfig;
+pub use report::StepReport;
+pub use resume::Resumed;
+pub use trainer::{Outcome, Trainer};

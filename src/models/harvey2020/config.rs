@@ -1,8 +1,10 @@
 //! Sizes of the network, its noise and its losses.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
-use crate::models::ModelError;
+use crate::models::settings::ValueError;
 
 /// Weights of the loss terms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -87,16 +89,13 @@ impl Harvey2020Config {
         ((arrival as f64 - self.noise_from as f64) / span).clamp(0.0, 1.0)
     }
 
-    /// Checks the fields against each other.
+    /// Checks the fields by themselves and against each other.
     ///
     /// # Errors
-    /// [`ModelError::Model`] that names the field and what it must be.
-    pub fn check(&self) -> Result<(), ModelError> {
-        let complain = |reason: String| {
-            Err(ModelError::Model {
-                model: "harvey2020".into(),
-                reason,
-            })
+    /// The first out of its range.
+    pub fn check(&self) -> Result<(), ValueError> {
+        let require = |valid: bool, key: &str, value: &dyn fmt::Display, expected: &str| {
+            ValueError::unless(valid, format!("model.{key}"), value, expected)
         };
         for (key, value, most) in [
             ("hidden", self.hidden, 65_536),
@@ -105,46 +104,33 @@ impl Harvey2020Config {
             ("arrival_frames", self.arrival_frames, 4096),
             ("noise_whole", self.noise_whole, 65_536),
         ] {
-            if !(1..=most).contains(&value) {
-                return complain(format!("model.{key} = {value}: expected 1 to {most}"));
-            }
+            let valid = (1..=most).contains(&value);
+            require(valid, key, &value, &format!("1 to {most}"))?;
         }
-        if !self.code.is_multiple_of(2) {
-            return complain(format!(
-                "model.code = {}: expected an even number",
-                self.code
-            ));
-        }
-        if self.noise_from >= self.noise_whole {
-            return complain(format!(
-                "model.noise_from = {}: expected less than model.noise_whole = {}",
-                self.noise_from, self.noise_whole
-            ));
-        }
-        if !(self.facing_sigma > 0.0 && self.facing_sigma <= 10_000.0) {
-            return complain(format!(
-                "model.facing_sigma = {}: expected a number of frames above 0 and at most 10000",
-                self.facing_sigma
-            ));
-        }
-        let HarveyLossWeights {
-            quaternion,
-            root,
-            position,
-            contact,
-            adversarial,
-        } = self.loss;
+        let even = self.code.is_multiple_of(2);
+        require(even, "code", &self.code, "an even number")?;
+        require(
+            self.noise_from < self.noise_whole,
+            "noise_from",
+            &self.noise_from,
+            &format!("less than model.noise_whole = {}", self.noise_whole),
+        )?;
+        require(
+            self.facing_sigma > 0.0 && self.facing_sigma <= 10_000.0,
+            "facing_sigma",
+            &self.facing_sigma,
+            "a number of frames above 0 and at most 10000",
+        )?;
+        let loss = self.loss;
         for (key, value) in [
             ("target_noise", self.target_noise),
-            ("loss.quaternion", quaternion),
-            ("loss.root", root),
-            ("loss.position", position),
-            ("loss.contact", contact),
-            ("loss.adversarial", adversarial),
+            ("loss.quaternion", loss.quaternion),
+            ("loss.root", loss.root),
+            ("loss.position", loss.position),
+            ("loss.contact", loss.contact),
+            ("loss.adversarial", loss.adversarial),
         ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return complain(format!("model.{key} = {value}: expected 0 or more"));
-            }
+            require(value.is_finite() && value >= 0.0, key, &value, "0 or more")?;
         }
         Ok(())
     }

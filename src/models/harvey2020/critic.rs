@@ -4,7 +4,7 @@ use rand::Rng;
 
 use super::config::Harvey2020Config;
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::models::transition::network::CRITICS;
+use crate::models::CRITICS;
 use crate::nn::{Activation, Initialiser, LastLayer, Mlp};
 
 /// Numbers of a frame that a critic sees: 23 joints relative to the root and the velocities of all 24.

@@ -9,6 +9,7 @@ use super::critic::Critic;
 use super::given::Given;
 use super::losses::{self, Motion, Scales, constant, joints};
 use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::models::generator::Condition;
 use crate::models::transition::Standardisation;
 use crate::models::transition::pose_windows::ROTATIONS;
 use crate::models::transition::posed_frames::posed_frames;
@@ -241,6 +242,10 @@ impl Rollout<'_> {
 impl<T: Real> Network<T> for Harvey2020 {
     fn reads_poses(&self) -> bool {
         true
+    }
+
+    fn conditions(&self) -> &'static [Condition] {
+        &[]
     }
 
     fn feed(&self, _drawn: Feed) -> Feed {

@@ -1,8 +1,10 @@
 //! Sizes of the network and its ablations.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
-use crate::models::ModelError;
+use crate::models::settings::ValueError;
 use crate::models::transition::RootFrame;
 use crate::nn::TransformerSizes;
 
@@ -148,92 +150,72 @@ impl Pan2021Config {
         }
     }
 
-    /// Checks the fields against each other.
+    /// Checks the fields by themselves and against each other.
     ///
     /// # Errors
-    /// [`ModelError::Model`] that names the field and what it must be.
-    pub fn check(&self) -> Result<(), ModelError> {
-        let complain = |reason: String| {
-            Err(ModelError::Model {
-                model: "pan2021".into(),
-                reason,
-            })
+    /// The first out of its range.
+    pub fn check(&self) -> Result<(), ValueError> {
+        let require = |valid: bool, key: &str, value: &dyn fmt::Display, expected: &str| {
+            ValueError::unless(valid, format!("model.{key}"), value, expected)
         };
         for (key, value) in [("lstms", self.lstms), ("decoders", self.decoders)] {
-            if !(1..=2).contains(&value) {
-                return complain(format!("model.{key} = {value}: expected 1 or 2"));
-            }
+            require((1..=2).contains(&value), key, &value, "1 or 2")?;
         }
-        for (key, value, most) in [
-            ("control_path_members", self.control_path_members, 64),
-            ("control_path_hidden", self.control_path_hidden, 65_536),
-            ("hidden", self.hidden, 65_536),
-            ("code", self.code, 4096),
-            ("heads", self.heads, 256),
-            ("encoder_layers", self.encoder_layers, 64),
-            ("decoder_layers", self.decoder_layers, 64),
-            ("feed_forward", self.feed_forward, 65_536),
-            ("loss.key_frames", self.loss.key_frames, 65_536),
+        for (key, value, least, most) in [
+            ("control_path_members", self.control_path_members, 1, 64),
+            ("control_path_hidden", self.control_path_hidden, 1, 65_536),
+            ("hidden", self.hidden, 1, 65_536),
+            ("code", self.code, 1, 4096),
+            ("heads", self.heads, 1, 256),
+            ("encoder_layers", self.encoder_layers, 1, 64),
+            ("decoder_layers", self.decoder_layers, 1, 64),
+            ("feed_forward", self.feed_forward, 1, 65_536),
+            ("loss.key_frames", self.loss.key_frames, 1, 65_536),
+            ("single_frames", self.single_frames, 0, 65_536),
         ] {
-            if !(1..=most).contains(&value) {
-                return complain(format!("model.{key} = {value}: expected 1 to {most}"));
-            }
+            let expected = format!("{least} to {most}");
+            require((least..=most).contains(&value), key, &value, &expected)?;
         }
-        if self.single_frames > 65_536 {
-            return complain(format!(
-                "model.single_frames = {}: expected 0 to 65536",
-                self.single_frames
-            ));
-        }
-        if !self.code.is_multiple_of(self.heads) {
-            return complain(format!(
-                "model.code = {}: expected a multiple of model.heads = {}",
-                self.code, self.heads
-            ));
-        }
-        if self.control_path && self.output == Output::Absolute {
-            return complain(
-                "model.control_path = true corrects an estimate: expected model.output = \"residual\""
-                    .into(),
-            );
-        }
-        if self.velocity_refinement && !self.velocity_factor {
-            return complain(
-                "model.velocity_refinement = true asks for velocity factors: expected model.velocity_factor = true".into(),
-            );
-        }
-        if self.window.is_multiple_of(2) || self.window > 1001 {
-            return complain(format!(
-                "model.window = {}: expected an odd number up to 1001",
-                self.window
-            ));
-        }
-        if !(0.0..1.0).contains(&self.dropout) {
-            return complain(format!(
-                "model.dropout = {}: expected at least 0 and below 1",
-                self.dropout
-            ));
-        }
-        let LossWeights {
-            rec,
-            con,
-            root,
-            key,
-            vfac,
-            single_frames,
-            ..
-        } = self.loss;
-        for (name, value) in [
-            ("rec", rec),
-            ("con", con),
-            ("root", root),
-            ("key", key),
-            ("vfac", vfac),
-            ("single_frames", single_frames),
+        require(
+            self.code.is_multiple_of(self.heads),
+            "code",
+            &self.code,
+            &format!("a multiple of model.heads = {}", self.heads),
+        )?;
+        require(
+            !self.control_path || self.output == Output::Residual,
+            "control_path",
+            &self.control_path,
+            "false, or model.output = \"residual\": it corrects an estimate",
+        )?;
+        require(
+            !self.velocity_refinement || self.velocity_factor,
+            "velocity_refinement",
+            &self.velocity_refinement,
+            "false, or model.velocity_factor = true: it asks for velocity factors",
+        )?;
+        require(
+            !self.window.is_multiple_of(2) && self.window <= 1001,
+            "window",
+            &self.window,
+            "an odd number up to 1001",
+        )?;
+        require(
+            (0.0..1.0).contains(&self.dropout),
+            "dropout",
+            &self.dropout,
+            "at least 0 and below 1",
+        )?;
+        let loss = self.loss;
+        for (key, value) in [
+            ("loss.rec", loss.rec),
+            ("loss.con", loss.con),
+            ("loss.root", loss.root),
+            ("loss.key", loss.key),
+            ("loss.vfac", loss.vfac),
+            ("loss.single_frames", loss.single_frames),
         ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return complain(format!("model.loss.{name} = {value}: expected 0 or more"));
-            }
+            require(value.is_finite() && value >= 0.0, key, &value, "0 or more")?;
         }
         Ok(())
     }

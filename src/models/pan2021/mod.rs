@@ -9,7 +9,7 @@
 //! - `losses`: eq. 3 to 11;
 //! - `units`: from standardised numbers to centimetres on the tape.
 //!
-//! `docs/model.md` fixes shapes, names and units.
+//! `docs/pan2021.md` fixes shapes, names and units.
 
 mod config;
 mod control_path;
@@ -22,3 +22,15 @@ mod units;
 
 pub use config::{Controllers, LossWeights, Output, Pan2021Config};
 pub use network::Pan2021;
+
+use crate::models::settings::Paper;
+
+/// The paper and the numbers that it prints.
+pub const PAPER: Paper = Paper {
+    name: "pan2021",
+    printed: include_str!("../../../experiments/pan2021/paper.toml"),
+};
+
+/// The group of learning rates of the controllers' Transformers, which a large rate switches off
+/// (docs/notes/why-the-controllers-switched-off.md).
+pub const TRANSFORMERS: &str = "transformers";

@@ -3,6 +3,7 @@
 use ndarray::Array3;
 use rand::Rng;
 
+use super::TRANSFORMERS;
 use super::config::{Controllers, Output, Pan2021Config};
 use super::control_path::ControlPath;
 use super::controller::{Controller, Session, Trajectory};
@@ -11,6 +12,7 @@ use super::guess::{self, Estimator};
 use super::losses;
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::models::generator::Condition;
 use crate::models::transition::Standardisation;
 use crate::models::transition::{Batch, Feed, Network};
 use crate::models::{LossTerms, ModelError};
@@ -437,10 +439,18 @@ impl<T: Real> Network<T> for Pan2021 {
         }
     }
 
-    fn in_transformer(&self, parameter: &str) -> bool {
+    fn conditions(&self) -> &'static [Condition] {
+        match self.config.velocity_factor {
+            true => &[Condition::RootTrajectory, Condition::VelocityFactors],
+            false => &[Condition::RootTrajectory],
+        }
+    }
+
+    fn rate_group(&self, parameter: &str) -> Option<&'static str> {
         let (part, _) = parameter.split_once('.').unwrap_or((parameter, ""));
-        self.config.controllers == Controllers::Transformer
-            && [ROOT_TRAJECTORY_CONTROLLER, VELOCITY_FACTOR_CONTROLLER].contains(&part)
+        let in_transformer = self.config.controllers == Controllers::Transformer
+            && [ROOT_TRAJECTORY_CONTROLLER, VELOCITY_FACTOR_CONTROLLER].contains(&part);
+        in_transformer.then_some(TRANSFORMERS)
     }
 
     fn losses(

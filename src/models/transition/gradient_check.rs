@@ -3,19 +3,23 @@
 use ndarray::{Array3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use thiserror::Error;
 
-use super::network::CRITICS;
-use super::{Batch, Feed, PoseWindows, SingleFrame};
-use super::{Standardisation, window_features};
+use super::{
+    Batch, DanceClip, Feed, ModelConfig, PoseWindows, SingleFrame, Standardisation, window_features,
+};
 use crate::autograd::check::{CheckReport, check_parameters};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
-use crate::data::{DanceClip, DataConfig, DataError};
-use crate::models::{ModelConfig, ModelError};
+use crate::data::{DataConfig, DataError};
+use crate::models::settings::GradientCheckOptions;
+use crate::models::{CRITICS, ModelError};
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
 
+/// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
+const TRANSITIONS: [usize; 2] = [12, 6];
 /// Frames of a generated clip beyond those of a window.
 const SPARE_FRAMES: usize = 120;
 /// Uniform noise on every weight, so that none stands at a special value such as 0.
@@ -33,17 +37,6 @@ pub struct GradientCase {
     pub dropout: bool,
 }
 
-/// How a gradient check is drawn and how much of it is compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GradientCheckConfig {
-    /// Windows in the batch.
-    pub windows: usize,
-    /// Most numbers of each parameter that are compared.
-    pub per_parameter: usize,
-    /// Seed of motion and weights.
-    pub seed: u64,
-}
-
 /// Why a gradient could not be checked.
 #[derive(Debug, Error)]
 pub enum GradientCheckError {
@@ -57,6 +50,51 @@ pub enum GradientCheckError {
     Model(#[from] ModelError),
     #[error(transparent)]
     Autograd(#[from] AutogradError),
+}
+
+impl GradientCase {
+    /// All ways: own predictions and the truth fed, without dropout and with it.
+    fn all(frames: Option<usize>) -> Vec<Self> {
+        let transitions = frames.map_or(TRANSITIONS.to_vec(), |frames| vec![frames]);
+        let mut cases = Vec::new();
+        for transition in transitions {
+            for feed in [Feed::Predictions, Feed::GroundTruth] {
+                for dropout in [false, true] {
+                    cases.push(Self {
+                        transition,
+                        feed,
+                        dropout,
+                    });
+                }
+            }
+        }
+        cases
+    }
+
+    fn title(&self) -> String {
+        let feed = match self.feed {
+            Feed::GroundTruth => "the truth fed",
+            Feed::Predictions => "own predictions fed",
+        };
+        let dropout = if self.dropout { "on" } else { "off" };
+        format!("N = {}, {feed}, dropout {dropout}", self.transition)
+    }
+}
+
+/// Checks a model in every [`GradientCase`] that it is trained in.
+///
+/// # Errors
+/// As [`check_model`].
+pub fn check_all(
+    model: &ModelConfig,
+    options: &GradientCheckOptions,
+) -> Result<Vec<(String, CheckReport)>, GradientCheckError> {
+    let cases = GradientCase::all(options.frames);
+    let reports: Vec<_> = cases
+        .par_iter()
+        .map(|&case| Ok(check_model(model, case, options)?.map(|report| (case.title(), report))))
+        .collect::<Result<_, GradientCheckError>>()?;
+    Ok(reports.into_iter().flatten().collect())
 }
 
 /// Windows of generated dance, each from a clip of its own, with their poses, and the statistics of those clips.
@@ -130,10 +168,10 @@ pub fn generated_windows(
 pub fn check_model(
     model: &ModelConfig,
     case: GradientCase,
-    config: GradientCheckConfig,
+    options: &GradientCheckOptions,
 ) -> Result<Option<CheckReport>, GradientCheckError> {
-    let (batch, standardisation) = generated_batch(case.transition, config.windows, config.seed)?;
-    let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+    let (batch, standardisation) = generated_batch(case.transition, options.windows, options.seed)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut parameters = Parameters::<f64>::new();
     let network = model.build(
         &mut Initialiser::new(&mut parameters, &mut rng),
@@ -156,7 +194,7 @@ pub fn check_model(
     let report = check_parameters(
         &mut parameters,
         &gradients,
-        config.per_parameter,
+        options.per_parameter,
         |parameters, name| {
             let mut tape = Tape::inference(parameters, &mut workspace);
             tape.set_dropout(key);

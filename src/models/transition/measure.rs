@@ -6,10 +6,11 @@ use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
+use super::ModelConfig;
 use super::Standardisation;
 use super::{Batch, Network, PoseWindows};
 use crate::autograd::{Parameters, Tape, Workspace};
-use crate::models::{ModelConfig, ModelError};
+use crate::models::ModelError;
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
 

@@ -1,30 +1,51 @@
 //! Transitions between two keyframes: what Pan et al. 2021, Harvey et al. 2020 and the baselines share.
+//!
+//! - the data: [`DanceClip`]s, their windows, statistics and frames of reference, mirror images and tempi;
+//! - [`Network`]: losses and predictions on a tape; [`TrainedModel`]: one with its weights;
+//! - [`TransitionModel`]: what fills a [`TransitionRequest`]; [`Transitions`]: one as a [`crate::models::Generator`];
+//! - [`TransitionTask`]: the curriculum, with scheduled sampling and single frames;
+//! - [`TransitionSettings`], [`ModelConfig`], [`Kind`]: their part of a config.
 
-pub(crate) mod augmentation;
+mod augmentation;
+mod dance_clip;
+pub mod effect;
+mod generator;
 pub mod gradient_check;
+mod kind;
+mod made_up;
 pub mod measure;
-pub(crate) mod motion_rows;
-pub(crate) mod network;
+pub(super) mod motion_rows;
+mod network;
 pub mod pose_windows;
-pub(crate) mod posed_frames;
+pub(super) mod posed_frames;
 mod ranges;
 mod request;
 pub mod root_frame;
-pub(crate) mod schedule;
-pub(crate) mod single_frames;
+mod schedule;
+mod settings;
+mod single_frames;
 mod standardisation;
+mod task;
 mod trained;
+mod training_windows;
 pub mod velocity_refinement;
 pub mod window;
 mod windows;
 
-pub use network::{Batch, CRITICS, Feed, LossTerms, Network, SingleFrame};
+pub use dance_clip::DanceClip;
+pub use generator::Transitions;
+pub use kind::{Kind, ModelConfig, NoSettings};
+pub use network::{Batch, Feed, Network, SingleFrame};
 pub use pose_windows::PoseWindows;
 pub use ranges::DataRanges;
-pub use request::{KeyframePose, ModelError, Transition, TransitionModel, TransitionRequest};
+pub use request::{KeyframePose, Transition, TransitionModel, TransitionRequest, check_frames};
 pub use root_frame::RootFrame;
 pub use schedule::{BatchPlan, Schedule};
+pub use settings::{
+    AugmentationConfig, ScheduleConfig, ScheduledSamplingConfig, TransitionSettings,
+};
 pub use standardisation::Standardisation;
+pub use task::TransitionTask;
 pub use trained::TrainedModel;
 pub use window::window_features;
 pub use windows::{Window, Windows, windows};

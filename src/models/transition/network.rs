@@ -1,12 +1,11 @@
-//! What training asks of a model: loss terms on a tape.
+//! What the training of transitions asks of a network: loss terms on a tape.
 
 use ndarray::Array3;
 
 use super::pose_windows::PoseWindows;
-use crate::autograd::{AutogradError, Real, Tape, Var};
-
-/// What the names of weights begin with that judge the others' output, see [`LossTerms::critics`].
-pub const CRITICS: &str = "critics.";
+use crate::autograd::{AutogradError, Real, Tape};
+use crate::models::LossTerms;
+use crate::models::generator::Condition;
 
 /// Windows of one length, or a shard of them, as the network reads them.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,35 +53,13 @@ pub enum Feed {
     Predictions,
 }
 
-/// Loss terms of a batch, each `[1]`.
-#[derive(Debug, Clone)]
-pub struct LossTerms {
-    /// The weighted sum that is run backwards.
-    pub total: Var,
-    /// The part of `total` that the weights named [`CRITICS`].. minimise, in an adversarial training. Their gradients come from it
-    /// alone, and the gradients of all other weights from the rest of `total` alone: each side is a constant in the other's part.
-    pub critics: Option<Var>,
-    /// Terms by name, not weighted, in a fixed order.
-    pub terms: Vec<(&'static str, Var)>,
-}
-
-impl LossTerms {
-    /// Terms by name with their weights in `total`, each `[1]`; `critics` as the field.
-    pub(crate) fn weighted<T: Real>(
-        tape: &mut Tape<'_, T>,
-        terms: &[(&'static str, f64, Var)],
-        critics: Option<Var>,
-    ) -> Result<Self, AutogradError> {
-        let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
-        for &(_, weight, term) in terms {
-            let weighted = tape.affine(term, weight, 0.0);
-            total = tape.add(total, weighted)?;
+impl Feed {
+    /// Its name in the log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GroundTruth => "ground_truth",
+            Self::Predictions => "predictions",
         }
-        Ok(Self {
-            total,
-            critics,
-            terms: terms.iter().map(|&(name, _, term)| (name, term)).collect(),
-        })
     }
 }
 
@@ -98,9 +75,14 @@ pub trait Network<T: Real>: Send + Sync {
         0
     }
 
-    /// Whether the parameter of this name is a Transformer's, see [`crate::optim::AdamConfig::transformer_learning_rate`].
-    fn in_transformer(&self, _parameter: &str) -> bool {
-        false
+    /// The group of learning rates that a parameter belongs to, see [`crate::optim::AdamConfig::rates`].
+    fn rate_group(&self, _parameter: &str) -> Option<&'static str> {
+        None
+    }
+
+    /// What its predictions follow from beside the two keyframes.
+    fn conditions(&self) -> &'static [Condition] {
+        &[Condition::RootTrajectory, Condition::VelocityFactors]
     }
 
     /// What it is fed at a step for which scheduled sampling drew `drawn`.

@@ -93,7 +93,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::ranges::*;
+    use super::*;
     use crate::motion::features::FEATURES;
     use ndarray::Array2;
 

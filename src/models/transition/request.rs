@@ -1,7 +1,9 @@
 //! What a model of transitions is asked for and what it gives back.
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, ArrayView2};
 
+use crate::models::ModelError;
+use crate::models::generator::Condition;
 use crate::motion::features::{FEATURES, FRAME};
 use crate::motion::{JOINTS, Pose, Skeleton};
 
@@ -112,26 +114,40 @@ impl Transition {
     ///
     /// [`ModelError::Shape`] or [`ModelError::NotFinite`].
     pub fn check(&self, length: usize) -> Result<(), ModelError> {
-        if self.frames.shape() != [length, FRAME] {
-            return Err(shape(
-                "predicted frames".into(),
-                &[length, FRAME],
-                self.frames.shape(),
-            ));
-        }
-        if !self.frames.iter().all(|x| x.is_finite()) {
-            return Err(ModelError::NotFinite {
-                what: "predicted frames".into(),
-            });
-        }
-        Ok(())
+        check_frames(self.frames.view(), length)
     }
+}
+
+/// Checks that these are `[length, 149]` finite numbers.
+///
+/// # Errors
+///
+/// [`ModelError::Shape`] or [`ModelError::NotFinite`].
+pub fn check_frames(frames: ArrayView2<f64>, length: usize) -> Result<(), ModelError> {
+    if frames.shape() != [length, FRAME] {
+        return Err(shape(
+            "predicted frames".into(),
+            &[length, FRAME],
+            frames.shape(),
+        ));
+    }
+    if !frames.iter().all(|x| x.is_finite()) {
+        return Err(ModelError::NotFinite {
+            what: "predicted frames".into(),
+        });
+    }
+    Ok(())
 }
 
 /// A model that fills transitions.
 pub trait TransitionModel: Send + Sync {
     /// The model's name in tables and figures, such as `whole_model`.
     fn name(&self) -> &str;
+
+    /// What it must be given beside the two keyframes.
+    fn conditions(&self) -> &'static [Condition] {
+        &[Condition::RootTrajectory]
+    }
 
     /// Predicts the frames k1 + 1 .. k2 of every request, in the order of the requests.
     ///
@@ -142,32 +158,4 @@ pub trait TransitionModel: Send + Sync {
     ///
     /// [`ModelError`] for a request that does not fit together or to the model.
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError>;
-}
-
-/// Why a transition could not be predicted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ModelError {
-    #[error("{what} has shape {found:?}, expected {expected:?}")]
-    Shape {
-        what: String,
-        expected: Vec<usize>,
-        found: Vec<usize>,
-    },
-    #[error(
-        "a transition goes from one keyframe to a later one, so its root trajectory needs 2 rows or more, it has {rows}"
-    )]
-    NoFrames { rows: usize },
-    #[error(
-        "the request's skeleton ({joints} joints) is not the 24-joint dance skeleton; map the clip to it first"
-    )]
-    Skeleton { joints: usize },
-    #[error("{what} has a NaN or an infinity")]
-    NotFinite { what: String },
-    #[error("{model}: {reason}")]
-    Model { model: String, reason: String },
-    /// For a saved model: more than its file holds.
-    #[error(
-        "the model of the config has more than {most} weights; choose smaller sizes in [model]"
-    )]
-    TooLarge { most: usize },
 }

@@ -157,7 +157,7 @@ fn turn_floor(frame: &mut ArrayViewMut1<f64>, sin: f64, cos: f64) {
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::root_frame::*;
+    use super::*;
     use crate::motion::features::FEATURES;
 
     /// A root that walks 3 cm a frame along x and stands at a height and a z of its own.

@@ -2,8 +2,8 @@
 
 use rand::seq::SliceRandom;
 
+use super::{ScheduleConfig, ScheduledSamplingConfig};
 use super::{Window, windows};
-use crate::experiment::config::{ScheduleConfig, ScheduledSamplingConfig};
 use crate::models::streams::Streams;
 
 /// Batch size that [`Schedule::teacher_forcing`] counts steps in, the paper's.
@@ -104,7 +104,7 @@ impl Schedule {
     }
 
     /// Frames of the training clips.
-    pub(crate) fn clip_frames(&self) -> &[usize] {
+    pub(super) fn clip_frames(&self) -> &[usize] {
         &self.clip_frames
     }
 
@@ -144,7 +144,7 @@ impl Schedule {
     /// A length's windows are dealt to as few batches as hold them, as evenly as possible: a rest of one window would be a step as
     /// large as any, in a direction that one window gives.
     pub fn epoch(&self, epoch: usize) -> Vec<BatchPlan> {
-        let mut rng = self.streams.shuffling(epoch);
+        let mut rng = self.streams.stream("shuffling", &[epoch as u64]);
         let mut batches = Vec::new();
         for &Share { length, count } in self.epochs.get(epoch).into_iter().flatten() {
             let mut all = windows(&self.clip_frames, length).windows;
@@ -172,7 +172,7 @@ impl Schedule {
 }
 
 /// `0..len` in `count` ranges whose lengths differ by one at most, the longer ones first.
-pub(crate) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+pub(super) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
     let (small, larger) = (len / count.max(1), len % count.max(1));
     (0..count).map(move |k| {
         let start = k * small + k.min(larger);
@@ -182,7 +182,7 @@ pub(crate) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::schedule::*;
+    use super::*;
     use proptest::prelude::*;
     use std::collections::{HashMap, HashSet};
 

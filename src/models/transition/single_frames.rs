@@ -11,7 +11,7 @@ const TRANSITIONS: RangeInclusive<usize> = 5..=150;
 
 /// Frame k1 + `frame` of a window of `length` + 1 frames; `frame` is from 1 to `length`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SingleFramePlan {
+pub(super) struct SingleFramePlan {
     pub window: Window,
     pub length: usize,
     pub frame: usize,
@@ -21,7 +21,7 @@ pub(crate) struct SingleFramePlan {
 ///
 /// The logarithm of a window's length is uniform, so that frames near keyframes are as frequent as frames far from both; a clip that is too
 /// short for the length is taken whole. Clips of one frame have none.
-pub(crate) fn draw(
+pub(super) fn draw(
     clip_frames: &[usize],
     count: usize,
     rng: &mut impl Rng,
@@ -57,7 +57,7 @@ pub(crate) fn draw(
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::single_frames::*;
+    use super::*;
     use proptest::prelude::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;

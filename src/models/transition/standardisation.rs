@@ -1,13 +1,20 @@
 //! Standardisation: mean and standard deviation of each feature over the training clips.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::window::wrap;
+use crate::models::Statistics;
+use crate::models::weights::{SavedWeights, WeightsError};
 use crate::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING, FEATURES};
 
 /// A standard deviation below this, in the feature's unit, counts as 1: a number that never changes is only centred.
 pub(crate) const SMALLEST_STD: f64 = 1e-4;
+/// Names of its arrays in a weights file.
+const MEAN: &str = "feature_mean";
+const STD: &str = "feature_std";
+const POSITION_SCALE: &str = "position_scale";
+const VELOCITY_SCALE: &str = "velocity_scale";
 
 /// Mean and standard deviation of the 154 numbers of a frame, and the scales of the losses that are not standardised.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -84,6 +91,43 @@ impl Standardisation {
     pub fn restore(&self, standardised: ArrayView2<f64>) -> Array2<f64> {
         Array2::from_shape_fn(standardised.raw_dim(), |(row, column)| {
             standardised[[row, column]] * self.std[column] + self.mean[column]
+        })
+    }
+
+    /// As what is saved beside the weights: `feature_mean [154]`, `feature_std [154]`, `position_scale [1]`,
+    /// `velocity_scale [1]`.
+    pub fn statistics(&self) -> Statistics {
+        let array = |values: &[f64]| Array1::from(values.to_vec()).into_dyn();
+        Statistics::default()
+            .with(MEAN, array(&self.mean))
+            .with(STD, array(&self.std))
+            .with(POSITION_SCALE, array(&[self.position_scale]))
+            .with(VELOCITY_SCALE, array(&[self.velocity_scale]))
+    }
+
+    /// Those of a weights file.
+    ///
+    /// # Errors
+    /// It lacks one, or a number is not finite or, of a deviation or scale, not above 0.
+    pub fn saved(weights: &SavedWeights) -> Result<Self, WeightsError> {
+        let numbers = |name: &'static str, count: usize| -> Result<Vec<f64>, WeightsError> {
+            let numbers: Vec<f64> = weights.statistic(name, &[count])?.into_iter().collect();
+            let problem = match numbers.iter().all(|x| x.is_finite()) {
+                false => "has a NaN or an infinity",
+                true if name == MEAN || numbers.iter().all(|&x| x > 0.0) => return Ok(numbers),
+                true => "has a number that is not above 0",
+            };
+            Err(WeightsError::Value {
+                path: weights.path.clone(),
+                name,
+                problem,
+            })
+        };
+        Ok(Self {
+            mean: numbers(MEAN, FEATURES)?,
+            std: numbers(STD, FEATURES)?,
+            position_scale: numbers(POSITION_SCALE, 1)?[0],
+            velocity_scale: numbers(VELOCITY_SCALE, 1)?[0],
         })
     }
 }

@@ -12,6 +12,7 @@ use super::{
 use super::{RootFrame, Standardisation};
 use crate::autograd::{Parameters, Tape, Workspace};
 use crate::models::ModelError;
+use crate::models::generator::Condition;
 use crate::motion::features::{FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 
 /// A trained network, in f32.
@@ -161,6 +162,10 @@ impl TrainedModel {
 impl TransitionModel for TrainedModel {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn conditions(&self) -> &'static [Condition] {
+        self.network.conditions()
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {

@@ -28,7 +28,7 @@ pub fn wrap(angle: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::window::*;
+    use super::*;
     use proptest::prelude::*;
 
     #[test]

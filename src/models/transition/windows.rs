@@ -41,7 +41,7 @@ pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
 
 #[cfg(test)]
 mod tests {
-    use crate::models::transition::windows::*;
+    use super::*;
 
     #[test]
     fn the_stride_is_the_tenth_of_the_window_rounded_up() {

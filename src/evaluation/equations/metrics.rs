@@ -5,7 +5,7 @@ use std::ops::Range;
 use ndarray::{ArrayView2, s};
 
 use crate::models::ModelError;
-use crate::models::transition::Transition;
+use crate::models::transition::check_frames;
 use crate::motion::contact::{FOOT_JOINTS, in_contact};
 use crate::motion::features::{BODY_POSITIONS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::placement::world_positions;
@@ -42,7 +42,7 @@ pub struct WindowScores {
 /// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two do not fit together.
 pub fn window_scores(
     recorded: ArrayView2<f64>,
-    predicted: &Transition,
+    predicted: ArrayView2<f64>,
 ) -> Result<WindowScores, ModelError> {
     let (rows, columns) = recorded.dim();
     if rows < 2 {
@@ -56,7 +56,7 @@ pub fn window_scores(
         });
     }
     let length = rows - 1;
-    predicted.check(length)?;
+    check_frames(predicted, length)?;
 
     let mut sums = WindowScores {
         body_position: 0.0,
@@ -67,12 +67,7 @@ pub fn window_scores(
     };
     let mut before_world = world_positions(recorded.row(0));
     let mut before = recorded.row(0);
-    for (truth, frame) in recorded
-        .rows()
-        .into_iter()
-        .skip(1)
-        .zip(predicted.frames.rows())
-    {
+    for (truth, frame) in recorded.rows().into_iter().skip(1).zip(predicted.rows()) {
         let distance = |range: Range<usize>| {
             range
                 .map(|column| (frame[column] - truth[column]).powi(2))

@@ -2,7 +2,7 @@
 
 use ndarray::{ArrayView2, s};
 
-use crate::models::transition::{KeyframePose, TransitionRequest};
+use crate::models::generator::{Given, Request};
 use crate::motion::Clip;
 use crate::motion::features::{ROOT_POSITION, VELOCITY_FACTORS};
 
@@ -10,23 +10,24 @@ use crate::motion::features::{ROOT_POSITION, VELOCITY_FACTORS};
 ///
 /// Given are the first frame k1, the last frame k2, and root positions and velocity factors of all frames. Nothing else
 /// of the recorded motion goes in. `None` where the clip has no such frames.
-pub fn window_request(
-    clip: &Clip,
-    start: usize,
-    window: ArrayView2<f64>,
-) -> Option<TransitionRequest> {
+pub fn window_request(clip: &Clip, start: usize, window: ArrayView2<f64>) -> Option<Request> {
     let length = window.nrows().checked_sub(1)?;
-    let keyframe = |frame: usize| {
-        Some(KeyframePose {
-            features: window.row(frame).to_owned(),
+    let given = |frame: usize| {
+        Some(Given {
+            frame: frame as i64,
             pose: clip.poses.get(start + frame)?.clone(),
+            features: Some(window.row(frame).to_owned()),
         })
     };
-    Some(TransitionRequest {
+    Some(Request {
         skeleton: clip.skeleton.clone(),
-        start: keyframe(0)?,
-        target: keyframe(length)?,
-        root_trajectory: window.slice(s![.., ROOT_POSITION]).to_owned(),
-        velocity_factors: window.slice(s![.., VELOCITY_FACTORS]).to_owned(),
+        frame_time: clip.frame_time,
+        frames: window.nrows(),
+        given: vec![given(0)?, given(length)?],
+        root: Some(window.slice(s![.., ROOT_POSITION]).to_owned()),
+        velocity_factors: Some(window.slice(s![.., VELOCITY_FACTORS]).to_owned()),
+        contacts: None,
+        music: None,
+        seed: 0,
     })
 }

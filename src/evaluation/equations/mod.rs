@@ -1,0 +1,319 @@
+//! The protocol `equations`: LRP, AVF and ART of Pan et al. 2021 as the paper's equations 12 to 16 define them.
+
+mod metrics;
+mod window_request;
+
+use std::fmt;
+
+use rayon::prelude::*;
+
+use self::metrics::{foot_skate, means};
+use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
+use super::scores::{ScoreRow, Scores};
+use super::{Better, Metric};
+use crate::data::{DataPart, Dataset};
+use crate::models::Generator;
+use crate::models::transition::{DanceClip, Window, window_features, windows};
+use crate::motion::FeatureConfig;
+
+pub use metrics::{WindowScores, window_scores};
+pub use window_request::window_request;
+
+const METRICS: [Metric; 4] = [
+    Metric {
+        key: "lrp",
+        title: "LRP",
+        unit: "cm",
+        better: Better::Lower,
+        about: "average L2 distance of root-relative positions (eq. 12), cm",
+    },
+    Metric {
+        key: "avf",
+        title: "AVF",
+        unit: "share of windows",
+        better: Better::Higher,
+        about: "share of windows with the velocity factors asked for (eq. 13 and 14)",
+    },
+    Metric {
+        key: "art",
+        title: "ART",
+        unit: "share of windows",
+        better: Better::Higher,
+        about: "share of windows on the root trajectory asked for (eq. 15 and 16)",
+    },
+    Metric {
+        key: "foot_skate",
+        title: "foot skate",
+        unit: "cm/frame",
+        better: Better::Lower,
+        about: "how far a foot joint moves in a frame in which the recorded one is in contact, cm/frame",
+    },
+];
+
+/// The protocol behind tables 2 to 4. The default is the paper's; scores of other lengths or thresholds are not comparable with
+/// it.
+///
+/// For each N, windows of N + 1 frames start every ceil(0.1 (N + 1)) frames of each clip. A model is given frame k1 (the first),
+/// the keyframe k2 (the last), root trajectory and velocity factors, and predicts the N frames k1 + 1 to k2. What is scored is
+/// its raw output, `[N, 149]`.
+///
+/// Foot skate has no score where some length has no contact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equations {
+    /// How clips are measured.
+    pub features: FeatureConfig,
+    /// Transition lengths N, frames.
+    pub lengths: Vec<usize>,
+    /// delta_v of eq. 13, cm/frame.
+    pub velocity_threshold: f64,
+    /// delta_r of eq. 15, cm.
+    pub root_threshold: f64,
+    /// At most this many windows of each length, spread evenly over all of them; none: all.
+    pub most_windows: Option<usize>,
+    /// Windows that a model predicts in one call. Bounds memory.
+    pub chunk: usize,
+}
+
+impl Default for Equations {
+    fn default() -> Self {
+        Self {
+            features: FeatureConfig::default(),
+            lengths: vec![10, 50, 100, 150],
+            velocity_threshold: 1.0,
+            root_threshold: 7.0,
+            most_windows: None,
+            chunk: 64,
+        }
+    }
+}
+
+/// A clip that is shorter than a window; its `Display` is the warning.
+struct SkippedClip<'c> {
+    clip: &'c str,
+    /// Number of frames that it has.
+    frames: usize,
+    /// N of the windows that it is too short for.
+    length: usize,
+}
+
+impl fmt::Display for SkippedClip<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} has {} frames, fewer than a window of {} (N = {}): left out of the scores at this length",
+            self.clip,
+            self.frames,
+            self.length + 1,
+            self.length
+        )
+    }
+}
+
+impl Protocol for Equations {
+    fn metrics(&self) -> &[Metric] {
+        &METRICS
+    }
+
+    fn lengths(&self) -> &[usize] {
+        &self.lengths
+    }
+
+    fn frames(&self, recordings: &[usize]) -> u64 {
+        let of_length =
+            |&length: &usize| (windows(recordings, length).windows.len() * (length + 1)) as u64;
+        self.lengths.iter().map(of_length).sum()
+    }
+
+    fn evaluate(
+        &self,
+        subject: &dyn Generator,
+        data: &Dataset,
+        part: DataPart,
+    ) -> Result<Evaluation, EvaluationError> {
+        let clips = DanceClip::measure_all(part.of(data)?, &self.features).map_err(|error| {
+            EvaluationError::Data {
+                reason: error.to_string(),
+            }
+        })?;
+        self.evaluate_clips(subject, &clips)
+    }
+}
+
+impl Equations {
+    /// The protocol with clips measured like this, and with what is chosen of it.
+    pub fn new(features: FeatureConfig, options: &EvaluationOptions) -> Self {
+        let own = Self::default();
+        Self {
+            features,
+            lengths: match options.lengths.is_empty() {
+                true => own.lengths,
+                false => options.lengths.clone(),
+            },
+            most_windows: options.most_windows,
+            ..own
+        }
+    }
+
+    /// Scores a model on all windows of clips that are measured already.
+    ///
+    /// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the number of threads and their
+    /// results are added in order, so the scores are the same to the bit on any number of threads.
+    ///
+    /// # Errors
+    ///
+    /// [`EvaluationError`]: a length without windows, or a model that fails or gives frames that do not fit.
+    pub fn evaluate_clips(
+        &self,
+        model: &dyn Generator,
+        clips: &[DanceClip],
+    ) -> Result<Evaluation, EvaluationError> {
+        let clip_frames: Vec<usize> = clips.iter().map(DanceClip::frames).collect();
+        let mut measured = Vec::new();
+        let mut warnings = Vec::new();
+        for &length in &self.lengths {
+            if length == 0 {
+                return Err(EvaluationError::ZeroLength);
+            }
+            let mut cut = windows(&clip_frames, length);
+            if cut.windows.is_empty() {
+                return Err(EvaluationError::NoWindows {
+                    length,
+                    needed: length + 1,
+                    clips: clips.len(),
+                    longest: clip_frames.iter().copied().max().unwrap_or(0),
+                });
+            }
+            warnings.extend(cut.skipped.iter().map(|&clip| {
+                let skipped = SkippedClip {
+                    clip: &clips[clip].name,
+                    frames: clip_frames[clip],
+                    length,
+                };
+                skipped.to_string()
+            }));
+            if let Some(most) = self.most_windows {
+                cut.windows = spread(&cut.windows, most);
+            }
+            measured.push((length, self.measure(model, clips, &cut.windows, length)?));
+        }
+        Ok(Evaluation {
+            scores: self.scores(&measured),
+            warnings,
+        })
+    }
+
+    /// The scores of the windows of each length.
+    fn scores(&self, measured: &[(usize, Vec<WindowScores>)]) -> Scores {
+        let row = |score: &dyn Fn(&[WindowScores]) -> f64| {
+            ScoreRow::new(
+                measured
+                    .iter()
+                    .map(|(length, windows)| (length, score(windows))),
+            )
+            .with_average()
+        };
+        let means =
+            |windows: &[WindowScores]| means(windows, self.velocity_threshold, self.root_threshold);
+        let mut rows = vec![
+            (METRICS[0].key, row(&|windows| means(windows)[0])),
+            (METRICS[1].key, row(&|windows| means(windows)[1])),
+            (METRICS[2].key, row(&|windows| means(windows)[2])),
+        ];
+        let skates: Option<Vec<(usize, f64)>> = measured
+            .iter()
+            .map(|(length, windows)| Some((*length, foot_skate(windows)?)))
+            .collect();
+        if let Some(skates) = skates {
+            rows.push((METRICS[3].key, ScoreRow::new(skates).with_average()));
+        }
+        let counts = measured.iter();
+        Scores::new(
+            rows,
+            counts.map(|(length, windows)| (length, windows.len())),
+        )
+    }
+
+    /// Scores of the windows of one length, in their order.
+    fn measure(
+        &self,
+        model: &dyn Generator,
+        clips: &[DanceClip],
+        windows: &[Window],
+        length: usize,
+    ) -> Result<Vec<WindowScores>, EvaluationError> {
+        let chunks: Vec<Vec<WindowScores>> = windows
+            .par_chunks(self.chunk.max(1))
+            .map(|chunk| measure_chunk(model, clips, chunk, length))
+            .collect::<Result<_, _>>()?;
+        Ok(chunks.into_iter().flatten().collect())
+    }
+}
+
+/// At most `most` of the windows, evenly spread over them.
+fn spread(windows: &[Window], most: usize) -> Vec<Window> {
+    let count = windows.len().min(most);
+    (0..count)
+        .map(|k| windows[k * windows.len() / count])
+        .collect()
+}
+
+fn measure_chunk(
+    model: &dyn Generator,
+    clips: &[DanceClip],
+    chunk: &[Window],
+    length: usize,
+) -> Result<Vec<WindowScores>, EvaluationError> {
+    let recorded: Vec<_> = chunk
+        .iter()
+        .map(|window| window_features(&clips[window.clip].features, window.start, length))
+        .collect();
+    let requests: Vec<_> = chunk
+        .iter()
+        .zip(&recorded)
+        .map(|(window, features)| {
+            let clip = &clips[window.clip];
+            window_request(&clip.clip, window.start, features.view()).ok_or_else(|| {
+                EvaluationError::Data {
+                    reason: format!(
+                        "{}: has {} poses but features of {} frames",
+                        clip.name,
+                        clip.clip.poses.len(),
+                        clip.features.nrows()
+                    ),
+                }
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    let predicted = model
+        .raw(&requests)
+        .map_err(|source| EvaluationError::Chunk {
+            model: model.name().to_string(),
+            length,
+            clip: clips[chunk[0].clip].name.clone(),
+            start: chunk[0].start,
+            source: Box::new(source),
+        })?;
+    if predicted.len() != chunk.len() {
+        return Err(EvaluationError::Count {
+            model: model.name().to_string(),
+            expected: chunk.len(),
+            found: predicted.len(),
+        });
+    }
+    chunk
+        .iter()
+        .zip(&recorded)
+        .zip(&predicted)
+        .map(|((window, recorded), predicted)| {
+            window_scores(recorded.view(), predicted.view()).map_err(|source| {
+                EvaluationError::Prediction {
+                    model: model.name().to_string(),
+                    clip: clips[window.clip].name.clone(),
+                    start: window.start,
+                    end: window.start + length,
+                    source: Box::new(source),
+                }
+            })
+        })
+        .collect()
+}

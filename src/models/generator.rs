@@ -1,0 +1,292 @@
+//! What may be asked of a model, trained or not: a [`Request`] says what is given, a [`Generator`] makes a [`Motion`] of it.
+
+use ndarray::{Array1, Array2, Array3};
+use thiserror::Error;
+
+use super::settings::ValueError;
+use crate::motion::{Pose, Skeleton};
+
+/// A pose that is given at a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// Frame of the result; below 0: the past.
+    pub frame: i64,
+    /// Local translations (cm) and rotations, one for each joint of the skeleton.
+    pub pose: Pose,
+    /// What [`crate::motion::features`] measures at this frame of a recording, `[154]` (cm, rad, cm/frame): where the pose
+    /// was recorded, its facing direction and velocities are known, too.
+    pub features: Option<Array1<f64>>,
+}
+
+/// What is given for a dance of F frames, and nothing else: the truth never travels with the question.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    pub skeleton: Skeleton,
+    /// Seconds from one frame to the next.
+    pub frame_time: f64,
+    /// F: frames 0 to F - 1 are asked for.
+    pub frames: usize,
+    /// Poses at any frames, by ascending frame: keyframes, a seed, the past.
+    pub given: Vec<Given>,
+    /// Root positions wanted, `[F, 3]`, cm.
+    pub root: Option<Array2<f64>>,
+    /// Velocity factors wanted of trunk, left leg, right leg, right arm and left arm, `[F, 5]`, cm/frame.
+    pub velocity_factors: Option<Array2<f64>>,
+    /// Ground contacts wanted, 0 to 1, `[F, feet]`.
+    pub contacts: Option<Array2<f64>>,
+    /// Features of the music, `[frames, numbers]`, frame 0 at frame 0 of the result.
+    pub music: Option<Array2<f64>>,
+    /// What every random number of the answer follows from.
+    pub seed: u64,
+}
+
+/// What a model made of a request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// World positions of the joints, `[F, joints, 3]`, cm.
+    pub positions: Array3<f64>,
+    /// The poses of a model that makes rotations, `[F]`; of others they are fitted to the positions.
+    pub poses: Option<Vec<Pose>>,
+    /// Facing angle, `[F]`, rad, unwrapped.
+    pub facing: Option<Array1<f64>>,
+    /// Ground contacts, 0 to 1, `[F, feet]`.
+    pub contacts: Option<Array2<f64>>,
+    /// What the network said before it became motion, in the numbers of the model, a row a frame that was not given.
+    pub raw: Option<Array2<f64>>,
+}
+
+/// Which poses a model must be given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NeededPoses {
+    /// None.
+    None,
+    /// This many frames before frame 0.
+    Past(usize),
+    /// Frame 0 and the last frame, and no other but of the past. What lies between more keyframes is made piece by piece.
+    Ends,
+    /// Two or more, the first at frame 0 and the last at the last frame.
+    Keyframes,
+}
+
+/// What can be given beside poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Condition {
+    RootTrajectory,
+    VelocityFactors,
+    Contacts,
+    Music,
+}
+
+/// What a model needs of a request, and what else it heeds: help, errors and warnings follow from it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Needs {
+    pub poses: NeededPoses,
+    /// Without these there is no answer.
+    pub conditions: &'static [Condition],
+    /// These change the answer where they are given.
+    pub heeds: &'static [Condition],
+}
+
+/// A model, trained or not.
+pub trait Generator: Send + Sync {
+    /// The model's name in tables and figures, that of its config.
+    fn name(&self) -> &str;
+
+    fn needs(&self) -> Needs;
+
+    /// A motion for every request, in their order. Each depends on its own request alone; those of one call may differ in
+    /// length.
+    ///
+    /// # Errors
+    /// A request that does not fit together or to the model.
+    fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError>;
+
+    /// [`Motion::raw`] of every request, without the rest.
+    ///
+    /// # Errors
+    /// As [`Generator::generate`]; a model that has none.
+    fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
+        let motions = self.generate(requests)?;
+        motions
+            .into_iter()
+            .map(|motion| motion.raw.ok_or_else(|| self.lacks("raw output")))
+            .collect()
+    }
+
+    /// Natural logarithm of the density of each truth under its request, in the numbers of the model.
+    ///
+    /// # Errors
+    /// As [`Generator::generate`]; a model that has none.
+    fn log_likelihoods(
+        &self,
+        _requests: &[Request],
+        _truths: &[Motion],
+    ) -> Result<Vec<f64>, ModelError> {
+        Err(self.lacks("likelihood"))
+    }
+
+    /// The error of a model that is asked for what it does not have.
+    fn lacks(&self, what: &'static str) -> ModelError {
+        ModelError::Model {
+            model: self.name().into(),
+            reason: format!("gives no {what}"),
+        }
+    }
+}
+
+impl Condition {
+    /// What it is called in a message.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::RootTrajectory => "root trajectory",
+            Self::VelocityFactors => "velocity factors",
+            Self::Contacts => "contacts",
+            Self::Music => "music",
+        }
+    }
+}
+
+impl Needs {
+    /// Whether the model reads this.
+    pub fn reads(&self, condition: Condition) -> bool {
+        self.conditions.contains(&condition) || self.heeds.contains(&condition)
+    }
+}
+
+impl Request {
+    /// Whether this is given.
+    pub fn has(&self, condition: Condition) -> bool {
+        match condition {
+            Condition::RootTrajectory => self.root.is_some(),
+            Condition::VelocityFactors => self.velocity_factors.is_some(),
+            Condition::Contacts => self.contacts.is_some(),
+            Condition::Music => self.music.is_some(),
+        }
+    }
+
+    /// Refuses a request that lacks what a model needs, or whose parts have other lengths than F.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] that names what to give, [`ModelError::Shape`], [`ModelError::NotFinite`].
+    pub fn check(&self, model: &str, needs: &Needs) -> Result<(), ModelError> {
+        let missing = |what: String| ModelError::Missing {
+            model: model.into(),
+            what,
+        };
+        let at = |frame: i64| self.given.iter().any(|given| given.frame == frame);
+        let last = self.frames as i64 - 1;
+        let ends = at(0) && at(last);
+        let own = self.given.iter().filter(|given| given.frame >= 0).count();
+        match needs.poses {
+            NeededPoses::Past(frames) if (1..=frames as i64).any(|before| !at(-before)) => {
+                return Err(missing(format!("the {frames} poses before frame 0")));
+            }
+            NeededPoses::Ends if !(ends && self.frames > 1 && own == 2) => {
+                return Err(missing(format!("two poses, at frame 0 and frame {last}")));
+            }
+            NeededPoses::Keyframes if !ends => {
+                return Err(missing(format!("poses at frame 0 and frame {last}")));
+            }
+            _ => {}
+        }
+        if let Some(condition) = needs.conditions.iter().find(|&&it| !self.has(it)) {
+            return Err(missing(format!("the {}", condition.title())));
+        }
+        for (what, array) in [
+            ("root trajectory", &self.root),
+            ("velocity factors", &self.velocity_factors),
+            ("contacts", &self.contacts),
+        ] {
+            let Some(array) = array else { continue };
+            if array.nrows() != self.frames {
+                return Err(ModelError::Shape {
+                    what: what.into(),
+                    expected: vec![self.frames, array.ncols()],
+                    found: array.shape().to_vec(),
+                });
+            }
+            if !array.iter().all(|x| x.is_finite()) {
+                return Err(ModelError::NotFinite { what: what.into() });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Motion {
+    /// Refuses a motion that is no answer to a request: other numbers of frames or joints, numbers that are not finite.
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`], [`ModelError::NotFinite`].
+    pub fn check(&self, request: &Request) -> Result<(), ModelError> {
+        let shape = |what: &str, expected: &[usize], found: &[usize]| match expected == found {
+            true => Ok(()),
+            false => Err(ModelError::Shape {
+                what: what.into(),
+                expected: expected.to_vec(),
+                found: found.to_vec(),
+            }),
+        };
+        let frames = request.frames;
+        let joints = request.skeleton.joints.len();
+        let positions = self.positions.shape();
+        shape("predicted positions", &[frames, joints, 3], positions)?;
+        if let Some(poses) = &self.poses {
+            shape("predicted poses", &[frames], &[poses.len()])?;
+        }
+        if let Some(facing) = &self.facing {
+            shape("predicted facing angles", &[frames], facing.shape())?;
+        }
+        if !self.positions.iter().all(|x| x.is_finite()) {
+            return Err(ModelError::NotFinite {
+                what: "predicted frames".into(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Why a model cannot be built or cannot answer.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ModelError {
+    #[error("{what} has shape {found:?}, expected {expected:?}")]
+    Shape {
+        what: String,
+        expected: Vec<usize>,
+        found: Vec<usize>,
+    },
+    /// The request lacks something that the model's [`Needs`] name.
+    #[error("{model} needs {what}")]
+    Missing { model: String, what: String },
+    #[error(
+        "a transition goes from one keyframe to a later one, so its root trajectory needs 2 rows or more, it has {rows}"
+    )]
+    NoFrames { rows: usize },
+    #[error(
+        "the request's skeleton ({joints} joints) is not the 24-joint dance skeleton; map the clip to it first"
+    )]
+    Skeleton { joints: usize },
+    #[error("{what} has a NaN or an infinity")]
+    NotFinite { what: String },
+    #[error("{model}: {reason}")]
+    Model { model: String, reason: String },
+    /// The data cannot be brought into the model's numbers.
+    #[error("{reason}")]
+    Data { reason: String },
+    #[error(transparent)]
+    Value(#[from] ValueError),
+    /// For a saved model: more than its file holds.
+    #[error(
+        "the model of the config has more than {most} weights; choose smaller sizes in [model]"
+    )]
+    TooLarge { most: usize },
+}
+
+impl ModelError {
+    /// Data that cannot be used, and why.
+    pub fn data(cause: &dyn std::error::Error) -> Self {
+        Self::Data {
+            reason: cause.to_string(),
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! What the commands ask of a kind of model: to read its part of a config, and to build what that describes.
+
+use std::any::Any;
+use std::fmt;
+
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+use toml::Table;
+
+use super::weights::{SavedWeights, WeightsError};
+use super::{Generator, ModelError, Streams, Task};
+use crate::autograd::check::CheckReport;
+use crate::data::{DataConfig, Dataset};
+use crate::evaluation::{EvaluationOptions, Protocol};
+use crate::nn::Initialiser;
+
+/// What draws a model's initial weights.
+pub type InitialRng = ChaCha8Rng;
+
+/// A paper that models belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Paper {
+    /// Name of its folders, such as `pan2021`.
+    pub name: &'static str,
+    /// The numbers that it prints, TOML: see [`crate::evaluation::PrintedTables`].
+    pub printed: &'static str,
+}
+
+/// A kind of model: what a config's `model.kind` names.
+pub trait ModelKind: Send + Sync {
+    /// Its name in a config.
+    fn name(&self) -> &str;
+
+    /// The name of an experiment that gives none.
+    fn default_name(&self) -> &str {
+        self.name()
+    }
+
+    /// The paper whose tables and figures its models stand in.
+    fn paper(&self) -> Paper;
+
+    /// The tables of a config that are its own, `[model]` among them, with the default of every key.
+    fn defaults(&self) -> Table;
+
+    /// Reads these tables.
+    ///
+    /// # Errors
+    /// A key that it does not know, or a value of the wrong kind.
+    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error>;
+
+    /// Gives keys of earlier versions their present names, in one layer of a config.
+    fn rename_former_keys(&self, _layer: &mut Table) {}
+}
+
+/// A model as a config describes it.
+pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
+    fn kind(&self) -> &str;
+
+    /// Every key of its tables with its value.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    fn tables(&self) -> Result<Table, toml::ser::Error>;
+
+    /// Checks values against each other and against how the data is read.
+    ///
+    /// # Errors
+    /// The first value out of its range.
+    fn check(&self, data: &DataConfig) -> Result<(), ValueError>;
+
+    /// The groups of learning rates that its parameters fall into, see [`Task::rate_group`].
+    fn rate_groups(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Keys, such as `model.refinement`, that act after the network: weights do not depend on them.
+    fn keys_after_the_network(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The steps of its training, its weights added through `init`.
+    ///
+    /// # Errors
+    /// A model that is not trained, data that it cannot be trained on, more weights than `init` allows.
+    fn task<'d>(
+        &self,
+        setting: &TaskSetting<'d>,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError>;
+
+    /// Steps to time: each `batch` windows of `frames` frames, made up.
+    ///
+    /// # Errors
+    /// As [`ModelSettings::task`].
+    fn made_up_task(
+        &self,
+        frames: usize,
+        batch: usize,
+        streams: Streams,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32>>, ModelError>;
+
+    /// The model with saved weights.
+    ///
+    /// # Errors
+    /// The weights are those of another model.
+    fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError>;
+
+    /// The model, where it needs no training.
+    fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>>;
+
+    /// How its tables score a model.
+    fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol>;
+
+    /// Compares the gradient of its loss with central differences, in f64 and, unless `full_size`, in small sizes. A title and
+    /// a report for each way to compute the loss.
+    ///
+    /// # Errors
+    /// A model that is not trained, or nothing to check it on.
+    fn check_gradients(
+        &self,
+        options: &GradientCheckOptions,
+    ) -> Result<Vec<(String, CheckReport)>, ModelError>;
+
+    fn clone_box(&self) -> Box<dyn ModelSettings>;
+}
+
+/// What a task is built from beside the model's own settings.
+#[derive(Debug, Clone)]
+pub struct TaskSetting<'d> {
+    pub dataset: &'d Dataset,
+    /// How the data was read, and how it is measured.
+    pub data: DataConfig,
+    pub streams: Streams,
+}
+
+/// How a gradient check is drawn and how much of it is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GradientCheckOptions {
+    /// Frames to predict, where they are not the model's own choice.
+    pub frames: Option<usize>,
+    /// Windows in the batch.
+    pub windows: usize,
+    /// Most numbers of each parameter that are compared.
+    pub per_parameter: usize,
+    /// Seed of data and weights.
+    pub seed: u64,
+    /// Keep the sizes of the config.
+    pub full_size: bool,
+}
+
+/// Why saved weights give no model.
+#[derive(Debug, Error)]
+pub enum LoadError {
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+}
+
+/// A value that no config can have.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{key} = {value}: expected {expected}")]
+pub struct ValueError {
+    pub key: String,
+    pub value: String,
+    pub expected: String,
+}
+
+impl ValueError {
+    /// An error about this key unless `valid`.
+    ///
+    /// # Errors
+    /// Where it is not valid.
+    pub fn unless(
+        valid: bool,
+        key: impl Into<String>,
+        value: impl fmt::Display,
+        expected: impl Into<String>,
+    ) -> Result<(), Self> {
+        match valid {
+            true => Ok(()),
+            false => Err(Self {
+                key: key.into(),
+                value: value.to_string(),
+                expected: expected.into(),
+            }),
+        }
+    }
+}
+
+impl Clone for Box<dyn ModelSettings> {
+    fn clone(&self) -> Self {
+        self.clone_box()
+    }
+}
+
+impl PartialEq for dyn ModelSettings {
+    fn eq(&self, other: &Self) -> bool {
+        self.kind() == other.kind() && self.tables() == other.tables()
+    }
+}
+
+impl dyn ModelSettings {
+    /// The settings, where they are of this type.
+    pub fn downcast_ref<S: ModelSettings>(&self) -> Option<&S> {
+        (self as &dyn Any).downcast_ref()
+    }
+
+    /// The settings, to be changed, where they are of this type.
+    pub fn downcast_mut<S: ModelSettings>(&mut self) -> Option<&mut S> {
+        (self as &mut dyn Any).downcast_mut()
+    }
+}

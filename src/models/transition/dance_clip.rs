@@ -1,0 +1,81 @@
+//! A clip with what is measured of every frame.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::data::{DataConfig, DataError, Recording};
+use crate::motion::{Clip, FeatureConfig, FeatureError, Mapping, at_tempo, features, mirror_image};
+
+/// A clip on the dance skeleton, with its features.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DanceClip {
+    /// The file's name with its extension.
+    pub name: String,
+    /// `[frames, 154]`, not standardised, the facing angle unwrapped along the clip.
+    pub features: Array2<f64>,
+    /// The motion at the config's rate.
+    pub clip: Clip,
+}
+
+impl DanceClip {
+    /// A clip brought to the config's rate, put on the dance skeleton by `mapping` where there is one, and measured.
+    ///
+    /// # Errors
+    /// The clip cannot be resampled, mapped or measured.
+    pub fn new(
+        clip: Clip,
+        mapping: Option<&Mapping>,
+        config: &DataConfig,
+    ) -> Result<Self, DataError> {
+        let Recording { clip } = Recording::new(clip, mapping, config)?;
+        Ok(Self::measure(clip, &config.features())?)
+    }
+
+    /// A clip on the dance skeleton, measured.
+    ///
+    /// # Errors
+    /// It is on another skeleton or too short.
+    pub fn measure(clip: Clip, config: &FeatureConfig) -> Result<Self, FeatureError> {
+        Ok(Self {
+            name: clip.name.clone(),
+            features: features(&clip, config)?,
+            clip,
+        })
+    }
+
+    /// Recordings, each measured, in their order.
+    ///
+    /// # Errors
+    /// The first that cannot be.
+    pub fn measure_all(
+        recordings: &[Recording],
+        config: &FeatureConfig,
+    ) -> Result<Vec<Self>, FeatureError> {
+        let measured: Vec<_> = recordings
+            .par_iter()
+            .map(|recording| Self::measure(recording.clip.clone(), config))
+            .collect();
+        measured.into_iter().collect()
+    }
+
+    /// The clip in the mirror, see [`mirror_image`].
+    ///
+    /// # Errors
+    /// The image cannot be measured.
+    pub fn mirror_image(&self, config: &DataConfig) -> Result<Self, DataError> {
+        Self::new(mirror_image(&self.clip), None, config)
+    }
+
+    /// The clip danced `tempo` times as fast, see [`at_tempo`].
+    ///
+    /// # Errors
+    /// It would be too long, or cannot be measured.
+    pub fn at_tempo(&self, tempo: f64, config: &DataConfig) -> Result<Self, DataError> {
+        Self::new(at_tempo(self.clip.clone(), tempo)?, None, config)
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.features.nrows()
+    }
+}

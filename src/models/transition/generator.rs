@@ -1,0 +1,166 @@
+//! Models of transitions as what the commands ask: a [`Generator`].
+
+use glam::DVec3;
+use ndarray::{Array1, Array2, Array3, s};
+
+use super::{KeyframePose, Transition, TransitionModel, TransitionRequest};
+use crate::models::generator::{Given, Motion, NeededPoses, Needs, Request};
+use crate::models::{Generator, ModelError};
+use crate::motion::features::{CONTACTS, FACING, FRAME};
+use crate::motion::placement::world_positions;
+use crate::motion::{Clip, FeatureConfig, JOINTS, PARTS, features};
+
+/// A model of transitions, asked for motion between two poses.
+pub struct Transitions {
+    model: Box<dyn TransitionModel>,
+}
+
+impl Transitions {
+    pub fn new(model: impl TransitionModel + 'static) -> Self {
+        Self::boxed(Box::new(model))
+    }
+
+    pub fn boxed(model: Box<dyn TransitionModel>) -> Self {
+        Self { model }
+    }
+
+    fn transitions(&self, requests: &[Request]) -> Result<Vec<Transition>, ModelError> {
+        let needs = self.needs();
+        let requests: Vec<TransitionRequest> = requests
+            .iter()
+            .map(|request| {
+                request.check(self.name(), &needs)?;
+                TransitionRequest::of(request)
+            })
+            .collect::<Result<_, _>>()?;
+        self.model.transitions(&requests)
+    }
+}
+
+impl Generator for Transitions {
+    fn name(&self) -> &str {
+        self.model.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs {
+            poses: NeededPoses::Ends,
+            conditions: self.model.conditions(),
+            heeds: &[],
+        }
+    }
+
+    fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
+        let transitions = self.transitions(requests)?;
+        let motions = requests.iter().zip(transitions);
+        motions
+            .map(|(request, transition)| motion(request, transition))
+            .collect()
+    }
+
+    fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
+        let transitions = self.transitions(requests)?;
+        Ok(transitions.into_iter().map(|it| it.frames).collect())
+    }
+}
+
+/// The frames of a transition in the world, after the keyframe that they start from.
+fn motion(request: &Request, transition: Transition) -> Result<Motion, ModelError> {
+    transition.check(request.frames.saturating_sub(1))?;
+    let frames = transition.frames;
+    let start = TransitionRequest::of(request)?.start.features;
+    let mut rows = Array2::zeros((request.frames, FRAME));
+    rows.row_mut(0).assign(&start.slice(s![..FRAME]));
+    rows.slice_mut(s![1.., ..]).assign(&frames);
+    let mut positions = Array3::zeros((request.frames, JOINTS, 3));
+    for (frame, row) in rows.rows().into_iter().enumerate() {
+        for (joint, position) in world_positions(row).into_iter().enumerate() {
+            for (axis, x) in DVec3::to_array(&position).into_iter().enumerate() {
+                positions[[frame, joint, axis]] = x;
+            }
+        }
+    }
+    Ok(Motion {
+        positions,
+        poses: None,
+        facing: Some(rows.column(FACING.start).to_owned()),
+        contacts: Some(rows.slice(s![.., CONTACTS]).to_owned()),
+        raw: Some(frames),
+    })
+}
+
+impl TransitionRequest {
+    /// From what is given for F frames: the poses of frame 0 and frame F - 1, trajectory and velocity factors, zeros where none
+    /// are given.
+    ///
+    /// # Errors
+    /// A pose is missing, or cannot be measured.
+    pub fn of(request: &Request) -> Result<Self, ModelError> {
+        let frames = request.frames;
+        let keyframe = |frame: i64| {
+            let given = request.given.iter().find(|given| given.frame == frame);
+            let given = given.ok_or(ModelError::NoFrames { rows: frames })?;
+            let before = request.given.iter().find(|it| it.frame == frame - 1);
+            Ok::<_, ModelError>(KeyframePose {
+                features: match &given.features {
+                    Some(features) => features.clone(),
+                    None => measured(request, given, before)?,
+                },
+                pose: given.pose.clone(),
+            })
+        };
+        let rows = |given: &Option<Array2<f64>>, columns: usize| {
+            let zeros = || Array2::zeros((frames, columns));
+            given.clone().unwrap_or_else(zeros)
+        };
+        Ok(Self {
+            skeleton: request.skeleton.clone(),
+            start: keyframe(0)?,
+            target: keyframe(frames as i64 - 1)?,
+            root_trajectory: rows(&request.root, 3),
+            velocity_factors: rows(&request.velocity_factors, PARTS),
+        })
+    }
+
+    /// As what any model may be asked, with `frame_time` seconds from one frame to the next.
+    pub fn into_request(self, frame_time: f64) -> Request {
+        let frames = self.root_trajectory.nrows();
+        let given = |frame: usize, keyframe: KeyframePose| Given {
+            frame: frame as i64,
+            pose: keyframe.pose,
+            features: Some(keyframe.features),
+        };
+        Request {
+            skeleton: self.skeleton,
+            frame_time,
+            frames,
+            given: vec![
+                given(0, self.start),
+                given(frames.saturating_sub(1), self.target),
+            ],
+            root: Some(self.root_trajectory),
+            velocity_factors: Some(self.velocity_factors),
+            contacts: None,
+            music: None,
+            seed: 0,
+        }
+    }
+}
+
+/// What a pose by itself tells, `[154]`: its own facing direction, and velocities from the pose before where one is given.
+fn measured(
+    request: &Request,
+    given: &Given,
+    before: Option<&Given>,
+) -> Result<Array1<f64>, ModelError> {
+    let poses = before.into_iter().chain([given]);
+    let clip = Clip {
+        name: format!("the pose at frame {}", given.frame),
+        skeleton: request.skeleton.clone(),
+        frame_time: request.frame_time,
+        poses: poses.map(|given| given.pose.clone()).collect(),
+    };
+    let rows =
+        features(&clip, &FeatureConfig::default()).map_err(|error| ModelError::data(&error))?;
+    Ok(rows.row(rows.nrows() - 1).to_owned())
+}

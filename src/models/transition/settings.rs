@@ -1,0 +1,244 @@
+//! What a config says of a transition model beside what all experiments have. The defaults are those of Pan et al. 2021.
+
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::gradient_check::{self, GradientCheckError};
+use super::made_up::MadeUpTask;
+use super::task::TransitionTask;
+use super::{ModelConfig, Standardisation, TrainedModel, Transitions};
+use crate::autograd::Parameters;
+use crate::autograd::check::CheckReport;
+use crate::data::DataConfig;
+use crate::evaluation::{EvaluationOptions, Protocol, equations::Equations};
+use crate::models::settings::{
+    GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
+};
+use crate::models::weights::SavedWeights;
+use crate::models::{Generator, ModelError, Streams, Task};
+use crate::nn::Initialiser;
+
+/// Longest transition that a schedule may name, frames.
+const LONGEST: usize = 10_000;
+/// Most windows that a batch may have.
+const LARGEST_BATCH: usize = 65_536;
+
+/// The tables of a config that belong to a transition model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TransitionSettings {
+    pub model: ModelConfig,
+    pub schedule: ScheduleConfig,
+    pub augmentation: AugmentationConfig,
+    pub scheduled_sampling: ScheduledSamplingConfig,
+}
+
+/// The curriculum: in epoch e (from 0) every transition length from
+/// `min(min_len + min_len_step floor(e / min_len_every), max_len)` to `min(min_len + max_len_step e, max_len)` frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ScheduleConfig {
+    /// Shortest and longest transition of the first epoch, frames.
+    pub min_len: usize,
+    /// Longest transition of the last epoch, frames.
+    pub max_len: usize,
+    /// How much the longest transition grows from one epoch to the next, frames.
+    pub max_len_step: usize,
+    /// How much the shortest transition grows every `min_len_every` epochs, frames.
+    pub min_len_step: usize,
+    /// Epochs until the shortest transition grows again.
+    pub min_len_every: usize,
+    /// Most windows in a batch.
+    pub batch_size: usize,
+    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not on the number of threads.
+    pub shards: usize,
+    /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths of every epoch, below 1 in
+    /// whole batches, see [`super::Schedule::new`].
+    pub fraction: f64,
+}
+
+impl Default for ScheduleConfig {
+    fn default() -> Self {
+        Self {
+            min_len: 5,
+            max_len: 70,
+            max_len_step: 1,
+            min_len_step: 4,
+            min_len_every: 5,
+            batch_size: 128,
+            shards: 4,
+            fraction: 1.0,
+        }
+    }
+}
+
+/// What is trained beside the recorded windows; the paper trains nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AugmentationConfig {
+    /// Each window that is trained is with probability 1/2 the one that a mirror shows, see
+    /// [`crate::motion::mirror_image`]; the statistics of the data are over the clips and their images.
+    pub mirror: bool,
+    /// Each window that is trained is, with the same probability, of the recorded clip or of the same clip at one of these
+    /// tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`]; of the recorded one where it would be too long for
+    /// that at this tempo. The statistics of the data leave them out. 16 at most, each from 0.25 to 4; at each, the training
+    /// clips are in memory once more.
+    pub tempi: Vec<f64>,
+}
+
+/// Scheduled sampling: one draw a batch, ground truth is fed with probability beta.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ScheduledSamplingConfig {
+    /// Factor of beta from one step of the whole schedule to the next, above 0 and at most 1; see
+    /// [`super::Schedule::teacher_forcing`].
+    pub decay: f64,
+}
+
+impl Default for ScheduledSamplingConfig {
+    fn default() -> Self {
+        Self { decay: 0.99995 }
+    }
+}
+
+impl ModelSettings for TransitionSettings {
+    fn kind(&self) -> &str {
+        self.model.kind()
+    }
+
+    fn tables(&self) -> Result<Table, toml::ser::Error> {
+        Table::try_from(self)
+    }
+
+    fn check(&self, data: &DataConfig) -> Result<(), ValueError> {
+        self.schedule.check()?;
+        let decay = self.scheduled_sampling.decay;
+        ValueError::unless(is_share(decay), "scheduled_sampling.decay", decay, SHARE)?;
+        let tempi = &self.augmentation.tempi;
+        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
+        let value = format!("{tempi:?}");
+        ValueError::unless(
+            usable,
+            "augmentation.tempi",
+            value,
+            "at most 16 tempi from 0.25 to 4",
+        )?;
+        self.model.check(data)
+    }
+
+    fn rate_groups(&self) -> &'static [&'static str] {
+        self.model.rate_groups()
+    }
+
+    fn keys_after_the_network(&self) -> &'static [&'static str] {
+        &["model.velocity_refinement"]
+    }
+
+    fn task<'d>(
+        &self,
+        setting: &TaskSetting<'d>,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
+        let data = setting.dataset.train.as_slice();
+        let clips = super::DanceClip::measure_all(data, &setting.data.features())
+            .map_err(|error| ModelError::data(&error))?;
+        let task = TransitionTask::new(self, setting, clips, |statistics| {
+            self.model.build(init, statistics)
+        })?;
+        Ok(Box::new(task))
+    }
+
+    fn made_up_task(
+        &self,
+        frames: usize,
+        batch: usize,
+        streams: Streams,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32>>, ModelError> {
+        Ok(Box::new(MadeUpTask::new(
+            self, frames, batch, streams, init,
+        )?))
+    }
+
+    fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
+        Ok(Box::new(Transitions::new(self.load(name, saved)?)))
+    }
+
+    fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>> {
+        let model = self.model.untrained(data.contact_threshold)?;
+        Some(Box::new(Transitions::boxed(model)))
+    }
+
+    fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol> {
+        Box::new(Equations::new(data.features(), options))
+    }
+
+    fn check_gradients(
+        &self,
+        options: &GradientCheckOptions,
+    ) -> Result<Vec<(String, CheckReport)>, ModelError> {
+        let model = match options.full_size {
+            true => self.model.clone(),
+            false => self.model.small(),
+        };
+        gradient_check::check_all(&model, options).map_err(|error| match error {
+            GradientCheckError::Model(error) => error,
+            other => ModelError::data(&other),
+        })
+    }
+
+    fn clone_box(&self) -> Box<dyn ModelSettings> {
+        Box::new(self.clone())
+    }
+}
+
+impl TransitionSettings {
+    /// The network with saved weights.
+    ///
+    /// # Errors
+    /// The weights are those of another model.
+    pub fn load(&self, name: &str, saved: &SavedWeights) -> Result<TrainedModel, LoadError> {
+        let standardisation = Standardisation::saved(saved)?;
+        let mut parameters = Parameters::new();
+        // Overwritten by the saved values, whatever is drawn.
+        let rng = Streams::new(0).initialisation();
+        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
+        let network = self.model.build(&mut init, &standardisation)?;
+        saved.load_into(&mut parameters, &standardisation.statistics())?;
+        let root_frame = self.model.root_frame();
+        Ok(TrainedModel::new(
+            name.into(),
+            network,
+            parameters,
+            standardisation,
+            root_frame,
+        )
+        .refining_velocities(self.model.refines_velocities()))
+    }
+}
+
+const SHARE: &str = "above 0 and at most 1";
+
+fn is_share(x: f64) -> bool {
+    x > 0.0 && x <= 1.0
+}
+
+impl ScheduleConfig {
+    fn check(&self) -> Result<(), ValueError> {
+        for (key, value, least, most) in [
+            ("min_len", self.min_len, 1, LONGEST),
+            ("max_len", self.max_len, self.min_len, LONGEST),
+            ("max_len_step", self.max_len_step, 1, LONGEST),
+            ("min_len_step", self.min_len_step, 0, LONGEST),
+            ("min_len_every", self.min_len_every, 1, LONGEST),
+            ("batch_size", self.batch_size, 1, LARGEST_BATCH),
+            ("shards", self.shards, 1, self.batch_size),
+        ] {
+            let expected = format!("a whole number from {least} to {most}");
+            let valid = (least..=most).contains(&value);
+            ValueError::unless(valid, format!("schedule.{key}"), value, expected)?;
+        }
+        let fraction = self.fraction;
+        ValueError::unless(is_share(fraction), "schedule.fraction", fraction, SHARE)
+    }
+}

@@ -1,0 +1,272 @@
+//! The training of a transition network: a curriculum of windows, scheduled sampling, single frames beside them.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rand::RngExt as _;
+use serde_json::{Map, Value, json};
+
+use super::augmentation::Augmentation;
+use super::schedule::parts;
+use super::settings::{ScheduledSamplingConfig, TransitionSettings};
+use super::single_frames::{self, SingleFramePlan};
+use super::training_windows::TrainingWindows;
+use super::{
+    Batch, BatchPlan, DanceClip, DataRanges, Feed, Network, Schedule, Standardisation,
+    TrainedModel, Transitions, Window,
+};
+use crate::autograd::{AutogradError, Parameters, Tape};
+use crate::models::settings::TaskSetting;
+use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
+
+/// The training of a network on the windows of clips.
+pub struct TransitionTask {
+    network: Arc<dyn Network<f32>>,
+    windows: TrainingWindows,
+    augmentation: Augmentation,
+    schedule: Schedule,
+    scheduled_sampling: ScheduledSamplingConfig,
+    shards: usize,
+    streams: Streams,
+    ranges: Option<DataRanges>,
+    /// The batches of the epoch that was asked for last.
+    epoch: Mutex<Option<(usize, Arc<Vec<BatchPlan>>)>>,
+}
+
+impl TransitionTask {
+    /// The training of the network that `build` makes from the statistics of the training clips.
+    ///
+    /// # Errors
+    /// Clips that are too short for the schedule or cannot be measured in another form; a network that cannot be built.
+    pub fn new(
+        settings: &TransitionSettings,
+        setting: &TaskSetting<'_>,
+        clips: Vec<DanceClip>,
+        build: impl FnOnce(&Standardisation) -> Result<Box<dyn Network<f32>>, ModelError>,
+    ) -> Result<Self, ModelError> {
+        let frames: Vec<usize> = clips.iter().map(DanceClip::frames).collect();
+        let ranges = DataRanges::of(clips.iter().map(|clip| clip.features.view()));
+        let (augmentation, clips) = Augmentation::of(clips, &settings.augmentation, &setting.data)
+            .map_err(|error| ModelError::data(&error))?;
+        let schedule = Schedule::new(&frames, &settings.schedule, setting.streams);
+        let longest = frames.iter().copied().max().unwrap_or(0);
+        if schedule.steps() == 0 {
+            return Err(ModelError::Data {
+                reason: format!(
+                    "the schedule has no step: no window of {} to {} frames at fraction {} of {} training clips, the longest \
+                     of {longest} frames; raise schedule.fraction, or lower schedule.batch_size or schedule.min_len",
+                    settings.schedule.min_len,
+                    settings.schedule.max_len,
+                    settings.schedule.fraction,
+                    frames.len(),
+                ),
+            });
+        }
+        let root_frame = settings.model.root_frame();
+        // Of the longest transitions that are trained.
+        let transition = settings.schedule.max_len.min(longest.saturating_sub(1));
+        let measured = &clips[..augmentation.at_recorded_tempo()];
+        let views = measured.iter().map(|clip| clip.features.view());
+        let standardisation = root_frame.standardisation(views, transition);
+        Ok(Self {
+            network: build(&standardisation)?.into(),
+            windows: TrainingWindows {
+                clips,
+                standardisation,
+                root_frame,
+            },
+            augmentation,
+            schedule,
+            scheduled_sampling: settings.scheduled_sampling.clone(),
+            shards: settings.schedule.shards,
+            streams: setting.streams,
+            ranges,
+            epoch: Mutex::new(None),
+        })
+    }
+
+    /// The curriculum.
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+
+    fn batches(&self, epoch: usize) -> Arc<Vec<BatchPlan>> {
+        let mut kept = self.epoch.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some((of, batches)) if *of == epoch => batches.clone(),
+            _ => {
+                let batches = Arc::new(self.schedule.epoch(epoch));
+                *kept = Some((epoch, batches.clone()));
+                batches
+            }
+        }
+    }
+
+    /// A batch of the schedule with the single frames of its step, all these windows in a form that `[augmentation]` allows.
+    fn plan(&self, batch: &BatchPlan, step: u64) -> StepPlan {
+        let count = self.network.single_frames();
+        let mut plan = StepPlan {
+            length: batch.length,
+            windows: batch.windows.clone(),
+            single_frames: single_frames::draw(
+                self.schedule.clip_frames(),
+                count,
+                &mut self.streams.stream("single_frames", &[step]),
+            ),
+        };
+        let clips = &self.windows.clips;
+        self.augmentation
+            .vary(&mut plan, clips, &self.streams, step);
+        plan
+    }
+}
+
+impl Task<f32> for TransitionTask {
+    fn steps(&self) -> u64 {
+        self.schedule.steps()
+    }
+
+    fn frame_steps(&self) -> u64 {
+        self.schedule.frame_steps()
+    }
+
+    fn step(&self, step: u64) -> Box<dyn Step<f32> + '_> {
+        let (epoch, position) = self.schedule.place(step);
+        let batches = self.batches(epoch);
+        let plan = self.plan(&batches[position], step);
+        let beta = self
+            .schedule
+            .teacher_forcing(&self.scheduled_sampling, step);
+        let mut sampling = self.streams.stream("sampling", &[step]);
+        let drawn = match sampling.random::<f64>() < beta {
+            true => Feed::GroundTruth,
+            false => Feed::Predictions,
+        };
+        Box::new(TransitionStep {
+            network: &*self.network,
+            windows: &self.windows,
+            shards: self.shards,
+            plan,
+            feed: self.network.feed(drawn),
+            epoch,
+            beta,
+        })
+    }
+
+    fn place(&self, step: u64) -> [u64; 2] {
+        let (epoch, position) = self.schedule.place(step);
+        [epoch as u64, position as u64]
+    }
+
+    fn rate_group(&self, parameter: &str) -> Option<&str> {
+        self.network.rate_group(parameter)
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.windows.standardisation.statistics()
+    }
+
+    fn generator(&self, name: &str, parameters: Parameters<f32>) -> Box<dyn Generator> {
+        Box::new(Transitions::new(TrainedModel::new(
+            name.into(),
+            self.network.clone(),
+            parameters,
+            self.windows.standardisation.clone(),
+            self.windows.root_frame,
+        )))
+    }
+
+    fn summary(&self) -> Option<String> {
+        Some(format!("{} epochs", self.schedule.epochs()))
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let skipped = self.schedule.skipped_lengths();
+        let ends = skipped.first().zip(skipped.last());
+        let warning = ends.map(|(first, last)| {
+            format!("no training clip is long enough for transitions of {first} to {last} frames: skipped")
+        });
+        warning.into_iter().collect()
+    }
+
+    fn facts(&self) -> Map<String, Value> {
+        let mut facts = Map::new();
+        let whole = self.schedule.whole_frame_steps();
+        facts.insert("whole_schedule_frame_steps".into(), json!(whole));
+        if let Some(ranges) = self.ranges {
+            facts.insert("data_ranges".into(), json!(ranges));
+        }
+        facts
+    }
+}
+
+/// What a step trains.
+#[derive(Debug, Clone)]
+pub(super) struct StepPlan {
+    /// N of the windows.
+    pub length: usize,
+    pub windows: Vec<Window>,
+    pub single_frames: Vec<SingleFramePlan>,
+}
+
+/// A step of the training.
+pub(super) struct TransitionStep<'t> {
+    pub network: &'t dyn Network<f32>,
+    pub windows: &'t TrainingWindows,
+    pub shards: usize,
+    pub plan: StepPlan,
+    pub feed: Feed,
+    pub epoch: usize,
+    /// Probability of the ground truth at this step.
+    pub beta: f64,
+}
+
+impl Step<f32> for TransitionStep<'_> {
+    fn shards(&self) -> usize {
+        self.shards.min(self.plan.windows.len())
+    }
+
+    fn frames(&self) -> u64 {
+        (self.plan.windows.len() * self.plan.length) as u64
+    }
+
+    fn losses(&self, tape: &mut Tape<'_, f32>, shard: usize) -> Result<LossTerms, AutogradError> {
+        let StepPlan {
+            length,
+            windows,
+            single_frames,
+        } = &self.plan;
+        let of_shard = |len: usize| parts(len, self.shards()).nth(shard).unwrap_or(0..0);
+        let shard_windows = &windows[of_shard(windows.len())];
+        let batch = Batch {
+            features: self.windows.features(shard_windows, *length),
+            poses: match self.network.reads_poses() {
+                true => self.windows.poses(shard_windows, *length),
+                false => None,
+            },
+            total_windows: windows.len(),
+            single_frames: self
+                .windows
+                .single_frames(&single_frames[of_shard(single_frames.len())]),
+            total_single_frames: single_frames.len(),
+        };
+        self.network.losses(tape, &batch, self.feed)
+    }
+
+    fn columns(&self) -> Vec<(&'static str, Value)> {
+        vec![
+            ("epoch", json!(self.epoch)),
+            ("length", json!(self.plan.length)),
+            ("batch", json!(self.plan.windows.len())),
+            ("feed", json!(self.feed.name())),
+            ("beta", json!(self.beta)),
+        ]
+    }
+
+    fn describe(&self) -> String {
+        format!(
+            "{} windows of {} frames",
+            self.plan.windows.len(),
+            self.plan.length
+        )
+    }
+}
