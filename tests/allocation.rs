@@ -1,4 +1,6 @@
 //! After the first steps a training step allocates nothing large: its buffers are those of the step before.
+//!
+//! A program of its own, because its allocator counts what all threads of the process allocate.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;

@@ -1,5 +1,7 @@
 //! Files that were damaged or made to do harm: an error or a sound result, no panic, never more than 1 GiB of memory for a file
 //! under 1 MiB.
+//!
+//! A program of its own, because its allocator counts what all threads of the process hold.
 
 #[path = "common/damage.rs"]
 mod damage;

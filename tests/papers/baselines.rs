@@ -1,13 +1,9 @@
 //! The untrained baselines beside interpolation: linear positions and zero velocity.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-
 use std::f64::consts::TAU;
 use std::fs;
 
 use assert_cmd::Command;
-use generated_data::write_clips;
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DanceClip, DataConfig, window_features};
 use keydance::evaluation::{window_request, window_scores};
@@ -22,6 +18,8 @@ use ndarray::{Array2, s};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use tempfile::TempDir;
+
+use crate::generated_data::write_clips;
 
 const THRESHOLD: f64 = 0.2;
 const LENGTHS: [usize; 4] = [1, 2, 7, 40];

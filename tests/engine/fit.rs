@@ -1,8 +1,5 @@
 //! Positions to rotations and back.
 
-#[path = "common/real_data.rs"]
-mod real_data;
-
 use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, Dataset, Split};
 use keydance::motion::fit::{RotationFitError, fit_rotations};
@@ -11,7 +8,8 @@ use keydance::motion::{
     Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, JOINTS, Joint, Pose, Skeleton, features,
 };
 use proptest::prelude::*;
-use real_data::dance_folder;
+
+use crate::real_data::dance_folder;
 
 fn skeleton() -> Skeleton {
     let joints = DANCE_JOINTS

@@ -1,10 +1,5 @@
 //! The motion viewer: a page that holds what it was given, escapes what users wrote, and plays in a browser.
 
-#[path = "common/browser.rs"]
-mod browser;
-#[path = "common/viewer_page.rs"]
-mod viewer_page;
-
 use std::fs;
 
 use glam::DVec3;
@@ -17,7 +12,9 @@ use keydance::motion::placement::world_positions;
 use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use ndarray::{Axis, concatenate, s};
 use tempfile::TempDir;
-use viewer_page::page_data;
+
+use crate::browser;
+use crate::viewer_page::page_data;
 
 const LENGTH: usize = 250;
 

@@ -1,22 +1,18 @@
 //! `keydance reproduce` through the binary: every row trained once, whatever stops it, and tables of what there is.
 
-#[path = "common/folders.rs"]
-mod folders;
-#[path = "common/generated_data.rs"]
-mod generated_data;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use folders::copy;
-use generated_data::write_clips;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::folders::copy;
+use crate::generated_data::write_clips;
 
 const SMALL: &str =
     "hidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n";

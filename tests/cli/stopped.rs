@@ -1,13 +1,6 @@
 //! Trainings that are stopped, killed or cannot write, through the binary: nothing is lost, and the end is the same to the bit.
 #![cfg(unix)]
 
-#[path = "common/folders.rs"]
-mod folders;
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/small_run.rs"]
-mod small_run;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
@@ -18,13 +11,14 @@ use std::sync::LazyLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use folders::copy;
 use keydance::training::checkpoint::list;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use small_run::{SmallRun, digest, keydance, stderr};
 use tempfile::TempDir;
+
+use crate::folders::copy;
+use crate::small_run::{SmallRun, digest, keydance, stderr};
 
 /// A schedule that no test waits to the end of.
 const LONG: [&str; 4] = [

@@ -1,8 +1,5 @@
 //! The network of Pan et al. 2021 and its ablations: what is built, what flows where, and that gradients are right.
 
-#[path = "common/network.rs"]
-mod network;
-
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
@@ -15,9 +12,10 @@ use keydance::models::{Batch, Feed, ModelConfig, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, Axis, s};
-use network::{Built, build, predict, residual, with_control_path};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+
+use crate::network::{Built, build, predict, residual, with_control_path};
 
 type Shapes = BTreeMap<String, Vec<usize>>;
 

@@ -1,14 +1,12 @@
 //! Bad files: an error that says where and what, no panic, nothing written.
 
-#[path = "common/damage.rs"]
-mod damage;
-
 use assert_cmd::cargo::cargo_bin_cmd;
-use damage::{damage, damages};
 use keydance::motion::bvh::{self, BvhError};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use proptest::prelude::*;
+
+use crate::damage::{damage, damages};
 
 const GOOD: &str = "HIERARCHY
 ROOT Hips

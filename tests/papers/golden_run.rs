@@ -1,19 +1,15 @@
 //! A small training on generated clips: the same losses on any machine, the same bits with any number of threads.
 //!
 //! The losses are those without dropout: its masks follow from the order of the operations, which may change where the mathematics
-//! does not. After a change of the mathematics that is meant, `cargo test --release --test golden_run -- --ignored` records the losses anew.
-
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/small_run.rs"]
-mod small_run;
+//! does not. After a change of the mathematics that is meant, `cargo test --release --test papers golden_run -- --ignored` records the losses anew.
 
 use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use small_run::{SmallRun, digest, keydance, stderr};
+
+use crate::small_run::{SmallRun, digest, keydance, stderr};
 
 /// Steps that are compared.
 const STEPS: usize = 10;

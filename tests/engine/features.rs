@@ -1,12 +1,8 @@
 //! The 154 numbers of a frame on motions whose features are known.
 
-#[path = "common/dance_clip.rs"]
-mod dance_clip;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use dance_clip::turning_clip;
 use glam::{DQuat, DVec3, EulerRot};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::facing::{facing_angles, facing_angles_between};
@@ -19,6 +15,8 @@ use keydance::motion::{
 };
 use ndarray::{Array2, s};
 use proptest::prelude::*;
+
+use crate::dance_clip::turning_clip;
 
 const HIPS: DVec3 = DVec3::new(0.0, 90.0, 0.0);
 

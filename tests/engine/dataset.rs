@@ -1,14 +1,8 @@
 //! Folders as data sets: split, digest, windows, standardisation.
 
-#[path = "common/dance_clip.rs"]
-mod dance_clip;
-#[path = "common/real_data.rs"]
-mod real_data;
-
 use std::f64::consts::PI;
 use std::path::Path;
 
-use dance_clip::turning_clip;
 use glam::DVec3;
 use keydance::data::{
     DanceClip, DataConfig, Dataset, Split, Standardisation, window_features, windows,
@@ -17,6 +11,9 @@ use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING};
 use ndarray::{Array2, s};
 use sha2::{Digest as _, Sha256};
+
+use crate::dance_clip::turning_clip;
+use crate::real_data;
 
 fn write_clip(folder: &Path, name: &str, frames: usize) {
     let clip = turning_clip(name, frames, |frame| {

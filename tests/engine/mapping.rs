@@ -1,19 +1,14 @@
 //! Mapping files: other skeletons on the 24 joints.
 
-#[path = "common/dance_clip.rs"]
-mod dance_clip;
-#[path = "common/martial_data.rs"]
-mod martial_data;
-#[path = "common/real_data.rs"]
-mod real_data;
-
 use std::path::Path;
 
-use dance_clip::turning_clip;
 use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, Dataset, Split};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::{DANCE_JOINTS, Mapping, resample};
+
+use crate::dance_clip::turning_clip;
+use crate::martial_data;
 
 /// A mapping of the dance skeleton on itself, with some lines in place of others.
 fn mapping(scale: &str, changed: &[(&str, &str)]) -> String {

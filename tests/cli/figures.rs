@@ -1,21 +1,17 @@
 //! `keydance figures` and `keydance generate --viewer` through the binary, on generated clips.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/trained_run.rs"]
-mod trained_run;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use generated_data::write_clips;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use roxmltree::Document;
 use tempfile::TempDir;
-use trained_run::{TrainedRun, keydance};
+
+use crate::generated_data::write_clips;
+use crate::trained_run::{TrainedRun, keydance};
 
 const FIGURES: [&str; 9] = [
     "figure_4b",

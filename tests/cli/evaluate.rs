@@ -1,26 +1,21 @@
 //! `keydance evaluate` and `keydance tables` through the binary.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/real_data.rs"]
-mod real_data;
-#[path = "common/trained_run.rs"]
-mod trained_run;
-
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use generated_data::write_clips;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
 use tempfile::TempDir;
-use trained_run::{TrainedRun, keydance};
+
+use crate::generated_data::write_clips;
+use crate::real_data;
+use crate::trained_run::{TrainedRun, keydance};
 
 const WEIGHTS: &str = "weights.safetensors";
 
@@ -501,7 +496,8 @@ fn interpolation_on_the_dance_data_has_the_known_scores() {
     };
     let out = TempDir::new().unwrap();
     let file = out.path().join("scores.json");
-    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/pan2021/interpolation.toml");
+    let config =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/pan2021/interpolation.toml");
     keydance("evaluate")
         .arg(config)
         .arg("--data")

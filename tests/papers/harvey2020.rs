@@ -1,15 +1,11 @@
 //! Harvey et al. 2020: what is built, what flows where, that gradients are right on both sides of its critics, and that it trains.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use assert_cmd::Command;
-use generated_data::write_clips;
 use glam::{DQuat, DVec3};
 use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
@@ -33,6 +29,8 @@ use predicates::str::contains;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
+
+use crate::generated_data::write_clips;
 
 fn adversarial() -> Harvey2020Config {
     Harvey2020Config::default()
@@ -650,7 +648,11 @@ fn settings_that_do_not_fit_are_refused_by_name() {
     ] {
         Command::cargo_bin("keydance")
             .unwrap()
-            .args(["gradcheck", "experiments/pan2021/harvey.toml", "--full-size"])
+            .args([
+                "gradcheck",
+                "experiments/pan2021/harvey.toml",
+                "--full-size",
+            ])
             .args(["--set", set])
             .assert()
             .failure()

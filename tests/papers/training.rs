@@ -1,12 +1,9 @@
 //! Training on small data with a small network: the same bits however it is run, and nothing lost when it stops.
 
-mod common;
-
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use common::training::{config, dataset, trainer, trainer_of};
 use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::models::pan2021::{Controllers, Pan2021Config};
 use keydance::models::weights::SavedWeights;
@@ -18,6 +15,8 @@ use keydance::training::{
 };
 use ndarray::Array3;
 use sha2::{Digest, Sha256};
+
+use crate::small_training::{self, config, dataset, trainer, trainer_of};
 
 /// Trains until `stop` steps are done, or to the end.
 fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: Option<u64>) -> Vec<StepReport> {
@@ -509,7 +508,7 @@ fn weights_of_another_model_are_refused_with_both_shapes() {
         ExperimentConfig::parse(&saved.config, "metadata").unwrap(),
         *small.config()
     );
-    let mut parameters = common::training::parameters(7);
+    let mut parameters = small_training::parameters(7);
     let text = saved.load_into(&mut parameters).unwrap_err().to_string();
     assert!(
         text.contains("hidden.weight is [8, 154] in the file, [7, 154]"),
@@ -517,7 +516,7 @@ fn weights_of_another_model_are_refused_with_both_shapes() {
     );
 
     train(&mut small, None, Some(3));
-    let mut parameters = common::training::parameters(8);
+    let mut parameters = small_training::parameters(8);
     saved.load_into(&mut parameters).unwrap();
     let digest = keydance::models::weights::digest(&parameters);
     assert_eq!(digest, trainer(&data, 1).weights_digest());
@@ -534,7 +533,7 @@ fn mutated_weights_files_are_errors_or_whole_and_never_panic() {
         let mut changed = content.clone();
         changed[at] ^= 0x55;
         if let Ok(saved) = SavedWeights::parse(&changed, path) {
-            let mut parameters = common::training::parameters(8);
+            let mut parameters = small_training::parameters(8);
             let _ = saved.load_into(&mut parameters);
         }
         assert!(SavedWeights::parse(&content[..at], path).is_err());
@@ -550,9 +549,7 @@ fn clips_shorter_than_every_window_are_an_error_that_says_what_to_do() {
     let mut config = config();
     config.schedule.min_len = 1000;
     config.schedule.max_len = 1000;
-    let error = common::training::try_trainer(config, &data, 1)
-        .err()
-        .unwrap();
+    let error = small_training::try_trainer(config, &data, 1).err().unwrap();
     let text = error.to_string();
     assert!(
         text.contains("1000") && text.contains("schedule.min_len"),

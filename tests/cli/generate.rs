@@ -1,16 +1,5 @@
 //! `keydance generate` through the binary.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/martial_data.rs"]
-mod martial_data;
-#[path = "common/real_data.rs"]
-mod real_data;
-#[path = "common/trained_run.rs"]
-mod trained_run;
-#[path = "common/viewer_page.rs"]
-mod viewer_page;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -21,14 +10,15 @@ use keydance::data::{DanceClip, DataConfig};
 use keydance::motion::features::VELOCITY_FACTORS;
 use keydance::motion::{Clip, Mapping, bvh};
 use keydance::synthesis::SequenceRequest;
-use martial_data::martial_folder;
 use ndarray::s;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
-use trained_run::{TrainedRun, keydance};
-use viewer_page::page_data;
+
+use crate::martial_data::martial_folder;
+use crate::trained_run::{TrainedRun, keydance};
+use crate::viewer_page::page_data;
 
 static FIXTURE: LazyLock<TrainedRun> = LazyLock::new(TrainedRun::new);
 

@@ -1,16 +1,13 @@
 //! Commands for those who work on keydance itself, through the binary: gradient checks, batches for other implementations, timings.
 
-#[path = "common/generated_data.rs"]
-mod generated_data;
-#[path = "common/small_run.rs"]
-mod small_run;
-
 use std::path::Path;
 use std::process::Output;
 
 use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;
-use small_run::{SmallRun, digest, keydance, stderr};
+
+use crate::generated_data;
+use crate::small_run::{SmallRun, digest, keydance, stderr};
 
 fn run(arguments: &[&str]) -> Output {
     keydance().args(arguments).output().unwrap()

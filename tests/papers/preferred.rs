@@ -1,8 +1,5 @@
 //! The options beside the paper, those of `experiments/preferred/`: residual outputs, the control path, the keyframe's frame of reference.
 
-#[path = "common/network.rs"]
-mod network;
-
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Tape, Workspace};
@@ -16,7 +13,8 @@ use keydance::models::{
 };
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
-use network::{Built, build, predict, residual, with_control_path};
+
+use crate::network::{Built, build, predict, residual, with_control_path};
 
 /// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least expected square error, where numbers d
 /// frames apart correlate by r(d) of `docs/model.md`.

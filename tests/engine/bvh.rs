@@ -1,13 +1,12 @@
 //! BVH files: what is read, what is written, and that the motion stays the same.
 
-#[path = "common/real_data.rs"]
-mod real_data;
-
 use glam::{DQuat, DVec3};
 use keydance::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use keydance::motion::{Clip, Joint, Pose, Skeleton};
 use ndarray::Array2;
 use proptest::prelude::*;
+
+use crate::real_data;
 
 const TWO_JOINTS: &str = "HIERARCHY
 ROOT Hips
