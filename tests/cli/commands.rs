@@ -1,4 +1,5 @@
-//! Commands for those who work on keydance itself, through the binary: gradient checks, batches for other implementations, timings.
+//! Commands for those who work on keydance itself, through the binary: gradient checks, batches for
+//! other implementations, timings.
 
 use std::path::Path;
 use std::process::Output;

@@ -1,4 +1,5 @@
-//! `keydance demo --reduced` through the binary: every result is written, and the model is ahead of what needs no training.
+//! `keydance demo --reduced` through the binary: every result is written, and the model is ahead of
+//! what needs no training.
 
 use std::fs;
 use std::path::Path;

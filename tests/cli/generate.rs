@@ -233,7 +233,8 @@ fn controls_combine() {
     for (asked, wanted) in factors.iter().flatten().zip(wanted) {
         assert!((asked - wanted).abs() < 0.0051, "{asked} {wanted}");
     }
-    // The curve is gone at the speeds of the clip, stretched to the same times; at one speed it would be elsewhere.
+    // The curve is gone at the speeds of the clip, stretched to the same times; at one speed it
+    // would be elsewhere.
     let clip = SequenceRequest::from_clip(&features(0), &[20, 80, 140]).unwrap();
     let clip = clip.at_times(&[0, 100, 140]).unwrap().root_trajectory;
     let clip: Vec<[f64; 3]> = clip

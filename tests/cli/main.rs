@@ -1,4 +1,5 @@
-//! The program from outside: its commands, and the files, figures and pages that it reads and writes.
+//! The program from outside: its commands, and the files, figures and pages that it reads and
+//! writes.
 
 // What several of these tests need.
 #[path = "../common/damage.rs"]

@@ -8,7 +8,8 @@ use keydance::report::{
 };
 use roxmltree::{Document, Node};
 
-/// A figure of sticks: each joint a step up and to the side of its parent, the root walking along X.
+/// A figure of sticks: each joint a step up and to the side of its parent, the root walking along
+/// X.
 fn dancers(frames: usize, lean: f64) -> Vec<[DVec3; JOINTS]> {
     (0..frames)
         .map(|time| {

@@ -1,4 +1,5 @@
-//! `keydance reproduce` through the binary: every row trained once, whatever stops it, and tables of what there is.
+//! `keydance reproduce` through the binary: every row trained once, whatever stops it, and tables
+//! of what there is.
 
 use std::fs;
 use std::path::{Path, PathBuf};

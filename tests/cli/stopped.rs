@@ -1,4 +1,5 @@
-//! Trainings that are stopped, killed or cannot write, through the binary: nothing is lost, and the end is the same to the bit.
+//! Trainings that are stopped, killed or cannot write, through the binary: nothing is lost, and the
+//! end is the same to the bit.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -210,7 +211,8 @@ fn a_killed_run_is_listed_as_interrupted_and_goes_on() {
 fn a_disk_that_takes_no_more_is_an_error_and_the_last_checkpoint_stays() {
     let (_folder, run) = STOPPED.copied();
     let before = files(&run.join("checkpoints"));
-    // A limit on the size of a file, in blocks of 512 or 1024 bytes: the weights are larger, the log is not.
+    // A limit on the size of a file, in blocks of 512 or 1024 bytes: the weights are larger, the
+    // log is not.
     let weights = before
         .iter()
         .find(|(path, _)| path.ends_with("weights.safetensors"));
@@ -247,7 +249,8 @@ fn a_folder_that_cannot_be_written_is_an_error_and_stays_as_it_is() {
         }
     };
     set(0o555);
-    // A file where the run's folder should be; then the folder itself, as somebody who may only read it.
+    // A file where the run's folder should be; then the folder itself, as somebody who may only
+    // read it.
     let blocked = STOPPED
         .small
         .train(&STOPPED.small.path("small.toml/run"), &LONG);
@@ -399,8 +402,9 @@ fn mistakes_in_the_command_or_its_files_have_exit_codes_of_their_own() {
     assert!(stderr(&again).contains("holds a run already; go on with --resume"));
 }
 
-/// Kills trainings with SIGKILL at random moments of their whole life, `kills` times together, and goes on after each; whenever one
-/// gets to its end, its weights are those of a training that was left alone, and another begins.
+/// Kills trainings with SIGKILL at random moments of their whole life, `kills` times together, and
+/// goes on after each; whenever one gets to its end, its weights are those of a training that was
+/// left alone, and another begins.
 fn kill_and_resume(kills: usize, seed: u64) {
     let small = SmallRun::new();
     let expected = digest(&small.train(&small.path("alone"), &[]));

@@ -1,4 +1,5 @@
-//! A model that is hardly trained, on generated clips, through the binary: for tests of what is done with a run.
+//! A model that is hardly trained, on generated clips, through the binary: for tests of what is
+//! done with a run.
 
 use std::fs;
 use std::path::PathBuf;
@@ -14,7 +15,8 @@ const SMALL: &str = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n\
     [model]\nkind = 'pan2021'\nhidden = 8\ncode = 8\nheads = 2\nfeed_forward = 8\nencoder_layers = 1\ndecoder_layers = 1\n\
     [schedule]\nmax_len = 6\nfraction = 0.05\nbatch_size = 8\nshards = 1\n[checkpoint]\nevery_steps = 5\n";
 
-/// A folder with six clips of 180 frames in `data`, the configs `interpolation.toml` and `small.toml`, and the latter's `run`.
+/// A folder with six clips of 180 frames in `data`, the configs `interpolation.toml` and
+/// `small.toml`, and the latter's `run`.
 pub struct TrainedRun {
     folder: TempDir,
 }

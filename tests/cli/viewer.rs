@@ -1,4 +1,5 @@
-//! The motion viewer: a page that holds what it was given, escapes what users wrote, and plays in a browser.
+//! The motion viewer: a page that holds what it was given, escapes what users wrote, and plays in a
+//! browser.
 
 use std::fs;
 
@@ -145,7 +146,8 @@ fn the_page_plays_in_a_browser_without_an_error() {
     assert_eq!(playing.attribute("data-error"), None, "{}", playing.log);
     assert!(playing.console().is_empty(), "{:?}", playing.console());
     assert_eq!(playing.attribute("data-playing"), Some("true"));
-    // A headless browser repaints as it likes: how far the motion is after 2 s is not said, only that it moves.
+    // A headless browser repaints as it likes: how far the motion is after 2 s is not said, only
+    // that it moves.
     let reached = frame(&playing).unwrap();
     assert!((2..=LENGTH).contains(&reached), "at frame {reached}");
     assert!(playing.document.contains("&lt;/script&gt;&lt;b&gt;"));

@@ -306,7 +306,8 @@ fn channels_do_not_jump_between_frames() {
         offset: DVec3::ZERO,
         end_sites: Vec::new(),
     };
-    // Turns through several circles while it nods past the upright, where two of the angles are not determined.
+    // Turns through several circles while it nods past the upright, where two of the angles are not
+    // determined.
     let rotation = |frame: usize| {
         let time = frame as f64;
         DQuat::from_rotation_y(0.07 * time) * DQuat::from_rotation_x(0.03 * time)
@@ -381,7 +382,8 @@ fn real_clips_keep_their_motion_through_angles_of_another_order() {
     }
 }
 
-/// A random hierarchy with its joints depth first: each joint hangs on one of the blocks that are still open.
+/// A random hierarchy with its joints depth first: each joint hangs on one of the blocks that are
+/// still open.
 fn hierarchies() -> impl Strategy<Value = (Skeleton, Vec<Vec<Channel>>)> {
     let all: Vec<Channel> = [Axis::X, Axis::Y, Axis::Z]
         .into_iter()

@@ -1,4 +1,5 @@
-//! The built-in data set through the public API: repeatable, within what a body can do, with contacts that are true.
+//! The built-in data set through the public API: repeatable, within what a body can do, with
+//! contacts that are true.
 
 use glam::DVec3;
 use keydance::data::choreography::{
@@ -157,7 +158,8 @@ proptest! {
             prop_assert!((82.0..97.0).contains(&median), "median root height {median}");
             prop_assert!(heights[0] > 45.0 && heights[heights.len() - 1] < 140.0);
             for frame in &positions {
-                // The deepest bows are those of contemporary lunges: the head comes down, but not to the hips.
+                // The deepest bows are those of contemporary lunges: the head comes down, but not
+                // to the hips.
                 let (hips, head) = (frame[0].y, frame[23].y);
                 prop_assert!(head > hips + 10.0, "head at {head}, hips at {hips}");
                 prop_assert!(hips < 80.0 || head > 95.0, "head at {head}, hips at {hips}");

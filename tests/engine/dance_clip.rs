@@ -31,7 +31,8 @@ const OFFSETS: [[f64; 3]; 24] = [
     [0.0, 7.0, 1.0],
 ];
 
-/// A clip at 30 fps in which the figure's root is where `root` says for each frame, turned about Y by the angle.
+/// A clip at 30 fps in which the figure's root is where `root` says for each frame, turned about Y
+/// by the angle.
 pub fn turning_clip(name: &str, frames: usize, root: impl Fn(usize) -> (DVec3, f64)) -> Clip {
     let joints: Vec<Joint> = (0..24)
         .map(|index| Joint {

@@ -1,4 +1,5 @@
-//! The whole model against recorded results of an independent implementation in PyTorch (`scripts/make_golden.py`).
+//! The whole model against recorded results of an independent implementation in PyTorch
+//! (`scripts/make_golden.py`).
 
 use std::collections::HashMap;
 

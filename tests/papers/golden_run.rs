@@ -1,7 +1,9 @@
-//! A small training on generated clips: the same losses on any machine, the same bits with any number of threads.
+//! A small training on generated clips: the same losses on any machine, the same bits with any
+//! number of threads.
 //!
-//! The losses are those without dropout: its masks follow from the order of the operations, which may change where the mathematics
-//! does not. After a change of the mathematics that is meant, `cargo test --release --test papers golden_run -- --ignored` records the losses anew.
+//! The losses are those without dropout: its masks follow from the order of the operations, which
+//! may change where the mathematics does not. After a change of the mathematics that is meant,
+//! `cargo test --release --test papers golden_run -- --ignored` records the losses anew.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Harvey et al. 2020: what is built, what flows where, that gradients are right on both sides of its critics, and that it trains.
+//! Harvey et al. 2020: what is built, what flows where, that gradients are right on both sides of
+//! its critics, and that it trains.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -70,7 +71,8 @@ fn shapes(config: &Harvey2020Config) -> BTreeMap<String, Vec<usize>> {
 fn the_network_has_the_layers_and_inputs_of_the_paper() {
     let mut expected = BTreeMap::new();
     for (name, sizes) in [
-        // 24 quaternions, root velocity, 4 contacts; root and quaternions to go; the target's quaternions.
+        // 24 quaternions, root velocity, 4 contacts; root and quaternions to go; the target's
+        // quaternions.
         ("state_encoder", vec![96 + 3 + 4, 512, 256]),
         ("offset_encoder", vec![3 + 96, 512, 256]),
         ("target_encoder", vec![96, 512, 256]),
@@ -246,7 +248,8 @@ fn predict(built: &Built<f64>, batch: &Batch<f64>) -> Array3<f64> {
     built.network.predict(&mut tape, batch).unwrap()
 }
 
-/// A network whose outputs are small changes, as after some training, on windows of `transition` frames.
+/// A network whose outputs are small changes, as after some training, on windows of `transition`
+/// frames.
 fn calm(transition: usize, windows: usize) -> (Built<f64>, Batch<f64>, Standardisation) {
     let (batch, standardisation) = generated_batch(transition, windows, 13).unwrap();
     let mut built: Built<f64> = build(&adversarial().small(), &standardisation);

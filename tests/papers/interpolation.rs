@@ -242,14 +242,16 @@ fn requests_that_do_not_fit_are_errors_not_panics() {
     assert!(attempt(&|_| {}).is_ok());
 }
 
-/// The folder with the dance clips: `KEYDANCE_DATA`, else `../shared/data/dance` beside the repository.
+/// The folder with the dance clips: `KEYDANCE_DATA`, else `../shared/data/dance` beside the
+/// repository.
 fn dance_data() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/dance");
     let folder = std::env::var_os("KEYDANCE_DATA").map_or_else(beside, PathBuf::from);
     folder.is_dir().then_some(folder)
 }
 
-/// The expected numbers come from another implementation of the features and of the protocol, on SciPy's rotations.
+/// The expected numbers come from another implementation of the features and of the protocol, on
+/// SciPy's rotations.
 #[test]
 fn scores_on_the_dance_test_clips_are_those_of_an_independent_implementation() {
     let Some(folder) = dance_data() else {

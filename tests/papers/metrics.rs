@@ -33,7 +33,8 @@ fn perfect(recorded: &Array2<f64>) -> Transition {
 fn lrp_is_the_norm_over_all_69_numbers_averaged_over_frames() {
     let recorded = still(4);
     let mut predicted = perfect(&recorded);
-    // Frame 1 is off by 3 and 4 cm at two joints: norm 5. Frame 3 by 7 cm at one joint. Frames 2 and 4 are right.
+    // Frame 1 is off by 3 and 4 cm at two joints: norm 5. Frame 3 by 7 cm at one joint. Frames 2
+    // and 4 are right.
     predicted.frames[[0, 0]] = 3.0;
     predicted.frames[[0, 68]] = 4.0;
     predicted.frames[[2, 30]] = -7.0;
@@ -58,8 +59,9 @@ fn root_deviation_is_the_mean_distance_in_space() {
 
 #[test]
 fn velocity_factors_come_from_predicted_positions_and_start_at_the_true_keyframe() {
-    // The recorded right hand (joint 17, weight 4 of 10) stands 6 cm out at k1 and never moves. The prediction has it at 0 in both
-    // frames: a jump of 6 cm in the first, 0 in the second. Right arm: 4 / 10 * 6 = 2.4 in the first frame.
+    // The recorded right hand (joint 17, weight 4 of 10) stands 6 cm out at k1 and never moves. The
+    // prediction has it at 0 in both frames: a jump of 6 cm in the first, 0 in the second. Right
+    // arm: 4 / 10 * 6 = 2.4 in the first frame.
     let mut recorded = still(2);
     let hand = 3 * (17 - 1);
     recorded.column_mut(hand).fill(6.0);
@@ -76,7 +78,8 @@ fn velocity_factors_come_from_predicted_positions_and_start_at_the_true_keyframe
 
 #[test]
 fn foot_skate_counts_where_the_recorded_feet_stand_whatever_the_model_says_of_its_own() {
-    // Recorded: the left ankle stands in frames 1 and 2 of 3. Predicted: it goes 2, 4 and 8 cm a frame.
+    // Recorded: the left ankle stands in frames 1 and 2 of 3. Predicted: it goes 2, 4 and 8 cm a
+    // frame.
     let mut recorded = still(3);
     recorded[[1, CONTACTS.start]] = 1.0;
     recorded[[2, CONTACTS.start]] = 1.0;
@@ -223,7 +226,8 @@ fn clip(name: &str, frames: usize, turn: f64, walk: f64, wave: f64) -> DanceClip
     }
 }
 
-/// Answers every request from the clips themselves, found again by the root trajectory, which the test makes unique.
+/// Answers every request from the clips themselves, found again by the root trajectory, which the
+/// test makes unique.
 struct Oracle<'a> {
     clips: &'a [DanceClip],
     root_shift: f64,
@@ -285,7 +289,8 @@ fn a_model_that_knows_the_answer_scores_0_1_1_and_a_shifted_one_misses_the_root(
         assert_eq!(scores.lrp.average(), 0.0);
         assert_eq!(scores.art.average(), art, "shifted by {root_shift}");
         assert_eq!(scores.avf.average(), 1.0);
-        // (61 - 11) / 2 + 1 and (40 - 11) / 2 + 1 windows of 11 frames; (61 - 31) / 4 + 1 and (40 - 31) / 4 + 1 of 31.
+        // (61 - 11) / 2 + 1 and (40 - 11) / 2 + 1 windows of 11 frames; (61 - 31) / 4 + 1 and
+        // (40 - 31) / 4 + 1 of 31.
         assert_eq!(scores.windows, BTreeMap::from([(10, 26 + 15), (30, 8 + 3)]));
         let warnings: Vec<String> = outcome
             .skipped
@@ -414,7 +419,8 @@ fn the_json_has_lengths_as_keys_and_avg_and_reads_back() {
         serde_json::from_str::<Evaluation>(&json).unwrap(),
         evaluation
     );
-    // Scores of a version that did not measure foot skate are read as above; those of this one keep it.
+    // Scores of a version that did not measure foot skate are read as above; those of this one keep
+    // it.
     let with_skate = Evaluation {
         foot_skate: Some(scores([0.5, 1.5])),
         ..evaluation

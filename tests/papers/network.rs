@@ -40,7 +40,8 @@ pub fn build<T: Real>(config: &Pan2021Config, standardisation: &Standardisation)
 }
 
 impl<T: Real> Built<T> {
-    /// As after some training: no weight stands at a special value, such as the zeros that a residual network begins with.
+    /// As after some training: no weight stands at a special value, such as the zeros that a
+    /// residual network begins with.
     pub fn disturbed(mut self) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         for (_, value) in self.parameters.values_mut() {

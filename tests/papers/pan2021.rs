@@ -1,4 +1,5 @@
-//! The network of Pan et al. 2021 and its ablations: what is built, what flows where, and that gradients are right.
+//! The network of Pan et al. 2021 and its ablations: what is built, what flows where, and that
+//! gradients are right.
 
 use std::collections::BTreeMap;
 
@@ -443,7 +444,8 @@ fn a_prediction_reads_only_what_is_given() {
         let built: Built<f64> = build(&config, &standardisation).disturbed();
         let before = predict(&built, &features);
         let mut unread = features.clone();
-        // Between the keyframes the root trajectory (69..72) and the velocity factors (149..154) are given, of k2 the pose too.
+        // Between the keyframes the root trajectory (69..72) and the velocity factors (149..154)
+        // are given, of k2 the pose too.
         for columns in [0..69, 72..FRAME] {
             unread.slice_mut(s![1..9, .., columns]).fill(1e6);
         }
@@ -590,7 +592,8 @@ fn reads(built: &Built<f64>, features: &Array3<f64>, row: usize, column: usize) 
 #[test]
 fn each_code_enters_the_lstms_at_its_own_place() {
     let (features, standardisation) = generated_windows(9, 2, 13).unwrap();
-    // Codes are 8 wide here: state, velocity, root trajectory, velocity factor; the target's beside the first LSTM's output.
+    // Codes are 8 wide here: state, velocity, root trajectory, velocity factor; the target's beside
+    // the first LSTM's output.
     let (one, two) = ("lstm.weight_ih_l0", "lstm2.weight_ih_l0");
     let first = "lstm1.weight_ih_l0";
     for (config, weight, columns, what, row, column) in [

@@ -1,4 +1,5 @@
-//! The options beside the paper, those of `experiments/preferred/`: residual outputs, the control path, the keyframe's frame of reference.
+//! The options beside the paper, those of `experiments/preferred/`: residual outputs, the control
+//! path, the keyframe's frame of reference.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +17,8 @@ use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
 
 use crate::network::{Built, build, predict, residual, with_control_path};
 
-/// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least expected square error, where numbers d
-/// frames apart correlate by r(d) of `docs/model.md`.
+/// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least
+/// expected square error, where numbers d frames apart correlate by r(d) of `docs/model.md`.
 fn estimate(t: usize, n: usize) -> [f64; 3] {
     kriging(t, n).0
 }
@@ -79,7 +80,8 @@ fn an_untrained_residual_network_is_the_best_linear_estimate_on_the_given_trajec
                 "{t} {column}: {found}, {expected}"
             );
         }
-        // At k2 nothing is open: whatever the weights, p^b is the keyframe's and p^r the trajectory's.
+        // At k2 nothing is open: whatever the weights, p^b is the keyframe's and p^r the
+        // trajectory's.
         let built: Built<f64> = build(&config, &statistics).disturbed();
         let predicted = predict(&built, &features);
         for window in 0..2 {
@@ -226,7 +228,8 @@ fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction
     }
 }
 
-/// Where what the control path sees of a frame stands: velocities of the trajectory, heights and factors, turn, estimate, keyframes.
+/// Where what the control path sees of a frame stands: velocities of the trajectory, heights and
+/// factors, turn, estimate, keyframes.
 const HEIGHTS: usize = 24;
 const TURN: usize = HEIGHTS + 13 * 6;
 const ESTIMATE: usize = TURN + 1;

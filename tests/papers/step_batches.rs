@@ -48,7 +48,8 @@ impl Network<f32> for Witness {
     }
 }
 
-/// Two training clips and a test clip of generated dances, the root of frame t moved along X by `by(t)`.
+/// Two training clips and a test clip of generated dances, the root of frame t moved along X by
+/// `by(t)`.
 fn moved(by: impl Fn(usize) -> f64) -> Dataset {
     let clips = generate(&ChoreographyConfig {
         clips: 3,
@@ -69,7 +70,8 @@ fn moved(by: impl Fn(usize) -> f64) -> Dataset {
     Dataset::from_clips(clips.collect(), &config).unwrap()
 }
 
-/// Far out on one side of the floor: in all windows p^r has an x above 1000, in their mirror images below -1000.
+/// Far out on one side of the floor: in all windows p^r has an x above 1000, in their mirror images
+/// below -1000.
 fn one_sided() -> Dataset {
     moved(|_| 3000.0)
 }
@@ -215,7 +217,8 @@ fn windows_are_seen_at_every_tempo_and_the_statistics_are_those_of_the_recorded_
     for share in shares(&windows(&batches)) {
         assert!((0.2..0.47).contains(&share), "{share}");
     }
-    // Of 89 frames of transition at most: where a clip is too short at twice the tempo, it is seen as it was recorded.
+    // Of 89 frames of transition at most: where a clip is too short at twice the tempo, it is seen
+    // as it was recorded.
     let single = batches.iter().flat_map(|batch| &batch.single_frames);
     let (long, short): (Vec<_>, Vec<_>) = single
         .map(|frame| frame.window.index_axis(Axis(1), 0))

@@ -74,8 +74,8 @@ fn a_bone_that_is_predicted_too_long_shows_in_the_errors() {
     assert!(transition_motion(&request, &transition, "transition", 1.0 / 30.0).is_err());
 }
 
-/// Interpolation between two other poses, on another path, with bones that are too long: it misses every keyframe, and its first frames already. Keeps
-/// what it was asked.
+/// Interpolation between two other poses, on another path, with bones that are too long: it misses
+/// every keyframe, and its first frames already. Keeps what it was asked.
 #[derive(Default)]
 struct Astray {
     asked: Mutex<Vec<TransitionRequest>>,
@@ -485,7 +485,8 @@ fn controls_beyond_the_data_and_against_each_other_are_warned_of_by_how_much() {
         let warnings = control_warnings(request, Some(&ranges));
         warnings.iter().map(ToString::to_string).collect()
     };
-    // A recorded motion is within its own bounds, but for the frame in a thousand that they leave out.
+    // A recorded motion is within its own bounds, but for the frame in a thousand that they leave
+    // out.
     for text in warned(&request) {
         assert!(
             text.contains("1.0 times") || text.contains(" 0 cm") || text.contains(" 1 cm"),

@@ -1,4 +1,5 @@
-//! Training on small data with a small network: the same bits however it is run, and nothing lost when it stops.
+//! Training on small data with a small network: the same bits however it is run, and nothing lost
+//! when it stops.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -132,7 +133,8 @@ fn a_resumed_training_ends_at_the_same_bits_wherever_it_stopped() {
     let epoch_starts: Vec<u64> = (0..steps)
         .filter(|&step| step > 0 && whole.schedule().place(step).1 == 0)
         .collect();
-    // At the end of the first epoch, where the shortest length grows (every 2 epochs), and inside epochs.
+    // At the end of the first epoch, where the shortest length grows (every 2 epochs), and inside
+    // epochs.
     let grows = epoch_starts
         .iter()
         .copied()

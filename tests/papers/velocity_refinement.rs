@@ -32,7 +32,8 @@ fn transition(clip: &DanceClip, length: usize) -> (Array2<f64>, TransitionReques
     (window, request)
 }
 
-/// What a model might predict: half of the movement about the mean pose, trembling by up to 1 cm, with the true keyframe at the end.
+/// What a model might predict: half of the movement about the mean pose, trembling by up to 1 cm,
+/// with the true keyframe at the end.
 fn slow_and_trembling(window: ArrayView2<f64>) -> Array2<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let last = window.nrows() - 1;
@@ -218,7 +219,8 @@ fn solve(mut matrix: Array2<f64>, mut right: Array1<f64>) -> Array1<f64> {
     right
 }
 
-/// The module's formula, one number at a time, with a dense matrix over all frames whose ends are held by their own rows.
+/// The module's formula, one number at a time, with a dense matrix over all frames whose ends are
+/// held by their own rows.
 fn expected(request: &TransitionRequest, frames: &Array2<f64>) -> Array2<f64> {
     let n = frames.nrows();
     let first = request
