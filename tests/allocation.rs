@@ -1,4 +1,7 @@
-//! After the first steps a training step allocates nothing large: its buffers are those of the step before.
+//! After the first steps a training step allocates nothing large: its buffers are those of the step
+//! before.
+//!
+//! A program of its own, because its allocator counts what all threads of the process allocate.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
@@ -60,7 +63,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// A training step on some windows of 12 frames: bytes of its large allocations, and the numbers that the workspace holds after it.
+/// A training step on some windows of 12 frames: bytes of its large allocations, and the numbers
+/// that the workspace holds after it.
 struct Step {
     large_bytes: usize,
     held: usize,

@@ -1,5 +1,7 @@
-//! Files that were damaged or made to do harm: an error or a sound result, no panic, never more than 1 GiB of memory for a file
-//! under 1 MiB.
+//! Files that were damaged or made to do harm: an error or a sound result, no panic, never more
+//! than 1 GiB of memory for a file under 1 MiB.
+//!
+//! A program of its own, because its allocator counts what all threads of the process hold.
 
 #[path = "common/damage.rs"]
 mod damage;
@@ -277,7 +279,8 @@ fn few_frames_a_second_do_not_become_a_clip_that_fills_memory() {
     memory_was_enough();
 }
 
-/// A weights file with one more tensor entry, or another in place of one: `"name":{...}` as it stands in the header.
+/// A weights file with one more tensor entry, or another in place of one: `"name":{...}` as it
+/// stands in the header.
 fn with_header(change: impl FnOnce(String) -> String) -> Vec<u8> {
     let (length, rest) = WEIGHTS.split_first_chunk::<8>().unwrap();
     let (header, data) = rest.split_at(u64::from_le_bytes(*length) as usize);

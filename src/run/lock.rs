@@ -15,7 +15,7 @@ const LOCK: &str = ".lock";
 #[derive(Debug)]
 pub(crate) struct FolderLock {
     /// None where the file system has no locks.
-    _file: Option<File>,
+    file: Option<File>,
 }
 
 impl FolderLock {
@@ -27,12 +27,12 @@ impl FolderLock {
         let path = folder.join(LOCK);
         let file = File::create(&path).map_err(FileError::at(&path, "created"))?;
         match file.try_lock() {
-            Ok(()) => Ok(Self { _file: Some(file) }),
+            Ok(()) => Ok(Self { file: Some(file) }),
             Err(TryLockError::WouldBlock) => Err(RunError::Locked {
                 path: folder.into(),
             }),
             Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
-                Ok(Self { _file: None })
+                Ok(Self { file: None })
             }
             Err(TryLockError::Error(error)) => Err(FileError::at(&path, "locked")(error).into()),
         }
@@ -42,5 +42,32 @@ impl FolderLock {
     pub fn is_taken(folder: &Path) -> bool {
         let file = File::open(folder.join(LOCK));
         file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+}
+
+impl Drop for FolderLock {
+    /// Unlocks, as closing the file does not where a process that another thread has just begun still has it open.
+    fn drop(&mut self) {
+        if let Some(file) = &self.file {
+            // What cannot be unlocked ends with the process.
+            let _ = file.unlock();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_free_as_soon_as_its_lock_is_dropped_whoever_still_has_the_file_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let lock = FolderLock::take(folder.path()).unwrap();
+        let elsewhere = lock.file.as_ref().unwrap().try_clone().unwrap();
+        assert!(FolderLock::is_taken(folder.path()));
+        drop(lock);
+        assert!(!FolderLock::is_taken(folder.path()));
+        FolderLock::take(folder.path()).unwrap();
+        drop(elsewhere);
     }
 }

@@ -5,7 +5,8 @@ use std::path::Path;
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 
-/// Writes six clips of `frames` frames as BVH files; with `split = { share = 0.8 }` four train and two test.
+/// Writes six clips of `frames` frames as BVH files; with `split = { share = 0.8 }` four train and
+/// two test.
 pub fn write_clips(folder: &Path, frames: usize, seed: u64) {
     let config = ChoreographyConfig {
         clips: 6,

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// The folder of the dance clips: `KEYDANCE_DATA`, or `../shared/data/dance`. Says so when there is neither.
+/// The folder of the dance clips: `KEYDANCE_DATA`, or `../shared/data/dance`. Says so when there is
+/// neither.
 pub fn dance_folder() -> Option<PathBuf> {
     let folder = match std::env::var_os("KEYDANCE_DATA") {
         Some(folder) => PathBuf::from(folder),

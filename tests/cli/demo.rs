@@ -1,0 +1,102 @@
+//! `keydance demo --reduced` through the binary: every result is written, and the model is ahead of
+//! what needs no training.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use keydance::motion::bvh;
+use predicates::prelude::PredicateBooleanExt as _;
+use predicates::str::contains;
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn demo(out: &Path) -> Command {
+    let mut command = Command::cargo_bin("keydance").unwrap();
+    command.args(["demo", "--reduced", "--out"]).arg(out);
+    command
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn the_reduced_demo_ends_ahead_of_what_needs_no_training_and_writes_every_result() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    demo(&out).assert().success().stdout(
+        contains("LRP (cm)")
+            .and(contains("AVF"))
+            .and(contains("ART"))
+            .and(contains("transition.bvh"))
+            .and(contains("N = 150: model")),
+    );
+
+    let lrp = |file: &str, length: &str| json(&out.join(file))["lrp"][length].as_f64().unwrap();
+    for length in ["100", "150"] {
+        let model = lrp("evaluation.json", length);
+        for other in ["interpolation.json", "untrained.json"] {
+            let other_lrp = lrp(other, length);
+            assert!(
+                model < other_lrp,
+                "N = {length}: {model}, {other_lrp} of {other}"
+            );
+        }
+    }
+    let tables = fs::read_to_string(out.join("tables.md")).unwrap();
+    for words in [
+        "## Table 2",
+        "## Table 4",
+        "generated clips",
+        &format!("{:.2}", lrp("evaluation.json", "150")),
+        &format!("{:.2}", lrp("interpolation.json", "avg")),
+    ] {
+        assert!(tables.contains(words), "{words}: {tables}");
+    }
+    for figure in ["loss_curve.svg", "motion.svg"] {
+        let text = fs::read_to_string(out.join(figure)).unwrap();
+        roxmltree::Document::parse(&text).unwrap();
+    }
+    let page = fs::read_to_string(out.join("viewer.html")).unwrap();
+    assert!(page.contains("Small whole model") && page.len() < 1_000_000);
+    let motion = bvh::read(&out.join("transition.bvh")).unwrap().to_clip();
+    assert_eq!(motion.poses.len(), 101);
+    assert!(motion.skeleton.is_dance_skeleton());
+    let manifest = json(&out.join("manifest.json"));
+    assert_eq!(manifest["state"], "finished");
+    assert_eq!(manifest["steps_done"], manifest["steps"]);
+}
+
+#[test]
+fn a_demo_takes_the_place_of_an_earlier_one_whether_ahead_or_behind() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    // Hardly trained.
+    let digests = ["0.004", "0.002"].map(|fraction| {
+        let ended = demo(&out).args(["--fraction", fraction]).output().unwrap();
+        assert!([Some(0), Some(4)].contains(&ended.status.code()));
+        let manifest = json(&out.join("manifest.json"));
+        assert_eq!(manifest["state"], "finished");
+        manifest["weights_digest"].clone()
+    });
+    assert_ne!(digests[0], digests[1]);
+}
+
+#[test]
+fn another_run_is_not_overwritten_and_a_wrong_fraction_is_named() {
+    let folder = TempDir::new().unwrap();
+    let config = folder.path().join("config.toml");
+    fs::write(&config, "name = 'mine'").unwrap();
+    demo(folder.path())
+        .assert()
+        .failure()
+        .stderr(contains("holds a run already"));
+    assert_eq!(fs::read_to_string(config).unwrap(), "name = 'mine'");
+    demo(&folder.path().join("new"))
+        .args(["--fraction", "1.5"])
+        .assert()
+        .failure()
+        .stderr(contains("--fraction").and(contains("1.5")));
+    assert!(!folder.path().join("new").exists());
+}

@@ -1,0 +1,32 @@
+//! The program from outside: its commands, and the files, figures and pages that it reads and
+//! writes.
+
+// What several of these tests need.
+#[path = "../common/damage.rs"]
+mod damage;
+#[path = "../common/generated_data.rs"]
+mod generated_data;
+#[path = "../common/martial_data.rs"]
+mod martial_data;
+#[path = "../common/real_data.rs"]
+mod real_data;
+#[path = "../common/small_run.rs"]
+mod small_run;
+
+mod browser;
+mod folders;
+mod trained_run;
+mod viewer_page;
+
+// The tests.
+mod bad_input;
+mod commands;
+mod demo;
+mod documents;
+mod evaluate;
+mod figures;
+mod generate;
+mod report;
+mod reproduce;
+mod stopped;
+mod viewer;

@@ -1,0 +1,451 @@
+//! Trainings that are stopped, killed or cannot write, through the binary: nothing is lost, and the
+//! end is the same to the bit.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+use std::os::unix::process::CommandExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::LazyLock;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use keydance::run::checkpoint::list;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::folders::copy;
+use crate::small_run::{SmallRun, digest, keydance, stderr};
+
+/// A schedule that no test waits to the end of.
+const LONG: [&str; 4] = [
+    "--set",
+    "schedule.max_len=40",
+    "--set",
+    "schedule.fraction=1",
+];
+
+/// A training in the background, its output in pipes.
+fn begin(small: &SmallRun, run: &Path, more: &[&str]) -> Child {
+    keydance()
+        .args(small.train_arguments(run, more))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn kill(child: &Child, signal: &str) {
+    let id = child.id().to_string();
+    let killed = Command::new("kill").args([signal, &id]).status().unwrap();
+    assert!(killed.success());
+}
+
+/// Waits until a training has logged more than `bytes` bytes.
+fn wait_for_log(child: &mut Child, run: &Path, bytes: u64) {
+    let begun = Instant::now();
+    while fs::metadata(run.join("log.jsonl")).map_or(0, |log| log.len()) <= bytes {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+        assert!(
+            begun.elapsed() < Duration::from_secs(120),
+            "it logs nothing"
+        );
+        sleep(Duration::from_millis(5));
+    }
+}
+
+fn manifest(run: &Path) -> Value {
+    serde_json::from_slice(&fs::read(run.join("manifest.json")).unwrap()).unwrap()
+}
+
+/// The line of `keydance runs` about the one run in a folder, and what is said of it below.
+fn listed(folder: &Path) -> String {
+    let output = keydance().arg("runs").arg(folder).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().skip(1).collect::<Vec<_>>().join("\n")
+}
+
+/// Every file below a folder with its content.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        if entry.file_type().unwrap().is_dir() {
+            found.extend(files(&entry.path()));
+        } else {
+            found.insert(entry.path(), fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+/// A long training that was stopped by Ctrl-C after its first steps, with what it said.
+struct Stopped {
+    small: SmallRun,
+    output: Output,
+}
+
+static STOPPED: LazyLock<Stopped> = LazyLock::new(|| {
+    let small = SmallRun::new();
+    let run = small.path("stopped");
+    let mut child = begin(&small, &run, &LONG);
+    wait_for_log(&mut child, &run, 0);
+
+    // While it runs, nobody else writes there.
+    for more in [&[][..], &["--resume"]] {
+        let second = small.train(&run, &[&LONG[..], more].concat());
+        let text = stderr(&second);
+        assert_eq!(second.status.code(), Some(1), "{text}");
+        assert!(
+            text.contains("another training writes to") && text.contains("--out"),
+            "{text}"
+        );
+    }
+    let line = listed(&run);
+    assert!(line.contains("running") && line.contains("small"), "{line}");
+
+    kill(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    Stopped { small, output }
+});
+
+impl Stopped {
+    fn run(&self) -> PathBuf {
+        self.small.path("stopped")
+    }
+
+    /// A copy of the run in a folder of its own.
+    fn copied(&self) -> (TempDir, PathBuf) {
+        let folder = TempDir::new().unwrap();
+        let run = folder.path().join("copy");
+        copy(&self.run(), &run);
+        (folder, run)
+    }
+
+    /// Goes on with a copy of the run, from its newest checkpoint, until it has logged a step more.
+    fn goes_on(&self, run: &Path) {
+        let (steps, _) = list(&run.join("checkpoints")).unwrap().pop().unwrap();
+        let before = fs::metadata(run.join("log.jsonl")).unwrap().len();
+        let mut child = begin(&self.small, run, &[&LONG[..], &["--resume"]].concat());
+        wait_for_log(&mut child, run, before);
+        child.kill().unwrap();
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            said.contains(&format!("goes on after step {steps}\n")),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn ctrl_c_ends_the_step_saves_and_says_how_to_go_on() {
+    let stopped = &*STOPPED;
+    let text = stderr(&stopped.output);
+    assert_eq!(stopped.output.status.code(), Some(130), "{text}");
+    let manifest = manifest(&stopped.run());
+    let steps = manifest["steps_done"].as_u64().unwrap();
+    assert_eq!(manifest["state"], "stopped");
+    assert!(
+        text.contains(&format!("stopped and saved after step {steps} of ")),
+        "{text}"
+    );
+    let saved = stopped
+        .run()
+        .join(format!("checkpoints/step-{steps:08}/state.bin"));
+    assert!(saved.exists());
+    let line = listed(&stopped.run());
+    assert!(
+        line.contains("stopped") && line.contains(&format!("{steps}/")),
+        "{line}"
+    );
+
+    // The command that it names goes on, in a shell; SIGTERM stops it as Ctrl-C does.
+    let (_folder, run) = stopped.copied();
+    let command = text
+        .lines()
+        .rfind(|line| line.contains("--resume"))
+        .unwrap();
+    let command = command.trim().strip_prefix("keydance ").unwrap();
+    let command = command.replace(stopped.run().to_str().unwrap(), run.to_str().unwrap());
+    let before = fs::metadata(run.join("log.jsonl")).unwrap().len();
+    let mut child = Command::new("sh")
+        .args(["-c", &format!("exec \"$0\" {command}")])
+        .arg(assert_cmd::cargo::cargo_bin!("keydance"))
+        .spawn()
+        .unwrap();
+    wait_for_log(&mut child, &run, before);
+    kill(&child, "-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+#[test]
+fn a_training_whose_messages_nobody_reads_goes_on_to_the_same_bits() {
+    let small = SmallRun::new();
+    let read = small.train(&small.path("read"), &[]);
+    let (reader, closed) = std::io::pipe().unwrap();
+    drop(reader);
+    let unread = keydance()
+        .args(small.train_arguments(&small.path("unread"), &[]))
+        .stderr(closed)
+        .output()
+        .unwrap();
+    assert!(stderr(&read).contains("step 1/"), "{}", stderr(&read));
+    assert_eq!(digest(&unread), digest(&read));
+}
+
+#[test]
+fn a_killed_run_is_listed_as_interrupted_and_goes_on() {
+    let (_folder, run) = STOPPED.copied();
+    STOPPED.goes_on(&run);
+    let line = listed(&run);
+    assert!(line.contains("interrupted"), "{line}");
+    STOPPED.goes_on(&run);
+}
+
+#[test]
+fn a_disk_that_takes_no_more_is_an_error_and_the_last_checkpoint_stays() {
+    let (_folder, run) = STOPPED.copied();
+    let before = files(&run.join("checkpoints"));
+    // A limit on the size of a file, in blocks of 512 or 1024 bytes: the weights are larger, the
+    // log is not.
+    let weights = before
+        .iter()
+        .find(|(path, _)| path.ends_with("weights.safetensors"));
+    assert!(weights.unwrap().1.len() > 100_000);
+    let output = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 80; exec \"$0\" \"$@\""])
+        .arg(assert_cmd::cargo::cargo_bin!("keydance"))
+        .args(
+            STOPPED
+                .small
+                .train_arguments(&run, &[&LONG[..], &["--resume"]].concat()),
+        )
+        .output()
+        .unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(
+        text.contains("weights.safetensors cannot be written: File too large"),
+        "{text}"
+    );
+    for (path, content) in &before {
+        assert_eq!(&fs::read(path).unwrap(), content, "{}", path.display());
+    }
+    STOPPED.goes_on(&run);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_an_error_and_stays_as_it_is() {
+    let (folder, run) = STOPPED.copied();
+    let before = files(&run);
+    let set = |mode| {
+        for path in [run.join("checkpoints"), run.clone()] {
+            fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+        }
+    };
+    set(0o555);
+    // A file where the run's folder should be; then the folder itself, as somebody who may only
+    // read it.
+    let blocked = STOPPED
+        .small
+        .train(&STOPPED.small.path("small.toml/run"), &LONG);
+    assert_eq!(blocked.status.code(), Some(1));
+    assert!(stderr(&blocked).contains("small.toml/run cannot be created"));
+
+    let mut command = keydance();
+    if folder.path().metadata().unwrap().uid() == 0 {
+        // Nothing keeps root from writing. Anybody may run a copy of the program.
+        for path in [folder.path().to_path_buf(), STOPPED.small.path("")] {
+            fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        let program = folder.path().join("keydance");
+        fs::copy(assert_cmd::cargo::cargo_bin!("keydance"), &program).unwrap();
+        command = Command::new(&program);
+        command.uid(65534);
+    }
+    let output = command
+        .args(
+            STOPPED
+                .small
+                .train_arguments(&run, &[&LONG[..], &["--resume"]].concat()),
+        )
+        .output()
+        .unwrap();
+    set(0o755);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains(run.to_str().unwrap()), "{text}");
+    assert!(text.contains("Permission denied"), "{text}");
+    assert_eq!(files(&run), before);
+    STOPPED.goes_on(&run);
+}
+
+#[test]
+fn a_run_of_another_version_goes_on_or_says_which_version_made_it() {
+    let (_folder, run) = STOPPED.copied();
+    let rewrite = |change: &dyn Fn(&mut Value)| {
+        let mut changed = manifest(&STOPPED.run());
+        changed["version"] = "0.0.9".into();
+        changed["commit"] = Value::Null;
+        change(&mut changed);
+        fs::write(run.join("manifest.json"), changed.to_string()).unwrap();
+    };
+    let refused = || {
+        let output = STOPPED
+            .small
+            .train(&run, &[&LONG[..], &["--resume"]].concat());
+        assert_eq!(output.status.code(), Some(1));
+        let text = stderr(&output);
+        assert!(
+            text.contains("made by keydance 0.0.9, this is 0.1.0"),
+            "{text}"
+        );
+        assert!(listed(&run).contains("0.0.9"), "{}", listed(&run));
+        text
+    };
+    let config = fs::read_to_string(run.join("config.toml")).unwrap();
+
+    // A key that this version does not know; a newer manifest; a newer training state.
+    rewrite(&|_| ());
+    fs::write(
+        run.join("config.toml"),
+        format!("{config}\n[music]\nbeats = true\n"),
+    )
+    .unwrap();
+    let text = refused();
+    assert!(
+        text.contains("music") && listed(&run).contains("damaged"),
+        "{text}"
+    );
+    fs::write(run.join("config.toml"), &config).unwrap();
+
+    rewrite(&|manifest| manifest["format"] = 2.into());
+    assert!(refused().contains("has format 2, and this version of keydance knows"));
+
+    rewrite(&|_| ());
+    for (path, mut content) in files(&run.join("checkpoints")) {
+        if path.ends_with("state.bin") {
+            content[8] = 2;
+            fs::write(path, content).unwrap();
+        }
+    }
+    assert!(refused().contains("has format 2, this version of keydance reads format 1"));
+
+    // An older manifest, of before it had a format.
+    copy(&STOPPED.run(), &run);
+    rewrite(&|manifest| {
+        manifest.as_object_mut().unwrap().remove("format");
+    });
+    assert!(listed(&run).ends_with("0.0.9"), "{}", listed(&run));
+    STOPPED.goes_on(&run);
+}
+
+#[test]
+fn a_divergence_has_an_exit_code_of_its_own_and_keeps_the_last_checkpoint() {
+    let small = &STOPPED.small;
+    let run = small.path("diverged");
+    let sets = [
+        "--set",
+        "optimiser.learning_rate=1e30",
+        "--set",
+        "checkpoint.every_steps=1",
+    ];
+    let output = small.train(&run, &sets);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    let steps = manifest(&run)["steps_done"].as_u64().unwrap();
+    for words in [
+        format!("step {} (", steps + 1),
+        "is not finite".into(),
+        "operation".into(),
+        "shape [".into(),
+    ] {
+        assert!(text.contains(&words), "{words}: {text}");
+    }
+    assert!(
+        run.join(format!("checkpoints/step-{steps:08}/weights.safetensors"))
+            .exists()
+    );
+    assert!(!run.join("weights.safetensors").exists());
+    assert!(listed(&run).contains("diverged"), "{}", listed(&run));
+}
+
+#[test]
+fn mistakes_in_the_command_or_its_files_have_exit_codes_of_their_own() {
+    let small = &STOPPED.small;
+    let code = |arguments: &[&str]| keydance().args(arguments).output().unwrap().status.code();
+    assert_eq!(code(&["train"]), Some(2));
+    assert_eq!(
+        code(&[
+            "train",
+            "x.toml",
+            "--data",
+            "d",
+            "--out",
+            "o",
+            "--threads",
+            "0"
+        ]),
+        Some(2)
+    );
+    let output = small.train(&small.path("never"), &["--set", "schedule.fraction=2"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("schedule.fraction = 2"));
+    assert!(!small.path("never").exists());
+    let again = small.train(&STOPPED.run(), &LONG);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(stderr(&again).contains("holds a run already; go on with --resume"));
+}
+
+/// Kills trainings with SIGKILL at random moments of their whole life, `kills` times together, and
+/// goes on after each; whenever one gets to its end, its weights are those of a training that was
+/// left alone, and another begins.
+fn kill_and_resume(kills: usize, seed: u64) {
+    let small = SmallRun::new();
+    let expected = digest(&small.train(&small.path("alone"), &[]));
+    let begun = Instant::now();
+    assert_eq!(digest(&small.train(&small.path("again"), &[])), expected);
+    let life = begun.elapsed();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut killed, mut saved, mut runs) = (0, 0, 0);
+    while killed < kills {
+        runs += 1;
+        let run = small.path(&format!("run{runs}"));
+        let finished = loop {
+            let mut child = begin(&small, &run, &["--resume"]);
+            if killed < kills {
+                sleep(life.mul_f64(rng.random::<f64>()));
+                if child.try_wait().unwrap().is_none() {
+                    child.kill().unwrap();
+                    child.wait().unwrap();
+                    killed += 1;
+                    saved += usize::from(run.join("checkpoints").exists());
+                    continue;
+                }
+            }
+            break child.wait_with_output().unwrap();
+        };
+        assert_eq!(digest(&finished), expected, "run {runs}");
+    }
+    eprintln!(
+        "{killed} kills, {saved} of them after a checkpoint, in {runs} runs: all ended at {expected}"
+    );
+    assert!(saved > 0, "no kill found a checkpoint");
+}
+
+#[test]
+fn sigkill_at_random_moments_loses_nothing() {
+    let number = |name: &str, default| {
+        let given = std::env::var(name).ok();
+        given.map_or(default, |text| text.parse().unwrap())
+    };
+    kill_and_resume(
+        number("KEYDANCE_KILLS", 6) as usize,
+        number("KEYDANCE_KILL_SEED", 1),
+    );
+}

@@ -1,0 +1,178 @@
+//! The motion viewer: a page that holds what it was given, escapes what users wrote, and plays in a
+//! browser.
+
+use std::fs;
+
+use glam::DVec3;
+use keydance::data::choreography::{ChoreographyConfig, generate};
+use keydance::data::{DanceClip, DataConfig};
+use keydance::evaluation::window_request;
+use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::TransitionModel;
+use keydance::models::transition::window_features;
+use keydance::motion::placement::world_positions;
+use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
+use ndarray::{Axis, concatenate, s};
+use tempfile::TempDir;
+
+use crate::browser;
+use crate::viewer_page::page_data;
+
+const LENGTH: usize = 250;
+
+/// A generated clip as ground truth, as model and, interpolated, as a baseline.
+fn viewer() -> Viewer {
+    let choreography = ChoreographyConfig {
+        clips: 1,
+        frames_per_clip: 280,
+        seed: 5,
+    };
+    let clip = generate(&choreography).unwrap().remove(0).clip;
+    let clip = DanceClip::new(clip, None, &DataConfig::default()).unwrap();
+    let window = window_features(&clip.features, 20, LENGTH);
+    let request = window_request(&clip.clip, 20, window.view()).unwrap();
+    let between = Interpolation::default()
+        .transitions(std::slice::from_ref(&request))
+        .unwrap()
+        .remove(0);
+    let first = window.slice(s![..1, ..149]);
+    let interpolated = concatenate(Axis(0), &[first, between.frames.view()]).unwrap();
+    let motion = |name, kind, frames| ViewerMotion::from_features(name, kind, frames);
+    Viewer {
+        title: "waltz.bvh, frames 20 to 270".into(),
+        frame_time: 1.0 / 30.0,
+        motions: vec![
+            motion("Ground truth", MotionKind::Recorded, window.view()),
+            motion("Interpolation", MotionKind::Other, interpolated.view()),
+            motion("Model", MotionKind::Model, window.view()),
+        ],
+        keyframes: [0, LENGTH]
+            .map(|frame| ViewerKeyframe {
+                frame,
+                positions: world_positions(window.row(frame)),
+            })
+            .to_vec(),
+        asked: Some(Asked::new(
+            request.root_trajectory.view(),
+            request.velocity_factors.view(),
+        )),
+    }
+}
+
+#[test]
+fn three_motions_of_250_frames_fit_into_a_page_of_half_a_megabyte_that_needs_no_network() {
+    let page = viewer().html().unwrap();
+    assert!(page.len() < 500_000, "{} bytes", page.len());
+    let data = page_data(&page);
+    assert_eq!(data["frames"], 251);
+    assert_eq!(data["motions"].as_array().unwrap().len(), 3);
+    assert_eq!(data["motions"][1]["factors"].as_array().unwrap().len(), 251);
+    assert_eq!(data["trajectory"].as_array().unwrap().len(), 251);
+    assert_eq!(data["keyframes"][1]["frame"], 250);
+    for outside in ["http://", "https://", "src=", "@import", "url("] {
+        let found = page.replace("http://www.w3.org", "").contains(outside);
+        assert!(!found, "{outside}");
+    }
+    assert!(page.contains("default-src 'none'"));
+    assert!(!page.contains("{{"));
+}
+
+#[test]
+fn names_that_look_like_markup_stay_names() {
+    let mut viewer = viewer();
+    let name = "</script><script>alert(1)</script><!-- & \"{{data}}\" \u{2028}.bvh";
+    viewer.title = name.into();
+    viewer.motions[0].name = name.into();
+    let page = viewer.html().unwrap();
+    let plain = self::viewer().html().unwrap();
+    let count = |text: &str, what: &str| text.to_lowercase().matches(what).count();
+    for tag in ["<script", "</script", "<!--", "<title"] {
+        assert_eq!(count(&page, tag), count(&plain, tag), "{tag}");
+    }
+    assert_eq!(page_data(&page)["motions"][0]["name"], name);
+    assert!(page.contains("<title>&lt;/script&gt;&lt;script&gt;alert(1)"));
+}
+
+#[test]
+fn measured_velocity_factors_are_those_of_the_features() {
+    let viewer = viewer();
+    let asked = &viewer.asked.as_ref().unwrap().velocity_factors;
+    let measured = &viewer.motions[0].velocity_factors;
+    for frame in 1..=LENGTH {
+        for part in 0..5 {
+            let difference = measured[frame][part] - asked[frame][part];
+            assert!(difference.abs() < 1e-9, "frame {frame}, part {part}");
+        }
+    }
+    assert_eq!(measured[0], measured[1]);
+}
+
+#[test]
+fn what_does_not_fit_together_is_an_error_that_names_it() {
+    let message = |change: &dyn Fn(&mut Viewer)| {
+        let mut viewer = viewer();
+        change(&mut viewer);
+        viewer.html().unwrap_err().to_string()
+    };
+    let text = message(&|viewer| viewer.motions[2].positions.truncate(9));
+    assert!(text.contains("Model has 9 frames"), "{text}");
+    let text = message(&|viewer| viewer.keyframes[1].frame = 251);
+    assert!(text.contains("keyframe 251"), "{text}");
+    let text = message(&|viewer| viewer.motions[1].positions[7][3].y = f64::NAN);
+    assert!(text.contains("Interpolation has a NaN"), "{text}");
+    let text = message(&|viewer| {
+        viewer.asked.as_mut().unwrap().root_trajectory[0] = DVec3::INFINITY;
+    });
+    assert!(text.contains("what was asked for"), "{text}");
+    let empty = Viewer {
+        motions: Vec::new(),
+        ..viewer()
+    };
+    assert!(matches!(empty.html(), Err(FigureError::Empty { .. })));
+}
+
+#[test]
+fn the_page_plays_in_a_browser_without_an_error() {
+    let Some(browser) = browser::browser() else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("viewer.html");
+    let mut viewer = viewer();
+    viewer.motions[1].name = "</script><b>\u{2028}'".into();
+    fs::write(&file, viewer.html().unwrap()).unwrap();
+
+    let playing = browser::load(&browser, &file, "", 2000);
+    let frame = |page: &browser::Loaded| page.attribute("data-frame").unwrap().parse::<usize>();
+    assert_eq!(playing.attribute("data-error"), None, "{}", playing.log);
+    assert!(playing.console().is_empty(), "{:?}", playing.console());
+    assert_eq!(playing.attribute("data-playing"), Some("true"));
+    // A headless browser repaints as it likes: how far the motion is after 2 s is not said, only
+    // that it moves.
+    let reached = frame(&playing).unwrap();
+    assert!((2..=LENGTH).contains(&reached), "at frame {reached}");
+    assert!(playing.document.contains("&lt;/script&gt;&lt;b&gt;"));
+
+    let still = browser::load(
+        &browser,
+        &file,
+        "#frame=40&view=overlay&theme=dark&hide=2",
+        500,
+    );
+    assert!(still.console().is_empty(), "{:?}", still.console());
+    assert_eq!(frame(&still).unwrap(), 40);
+    assert_eq!(still.attribute("data-theme"), Some("dark"));
+    assert_eq!(still.attribute("data-arrangement"), Some("overlay"));
+
+    let foreign = folder.path().join("broken.html");
+    let broken = viewer
+        .html()
+        .unwrap()
+        .replace(r#""frames":251"#, r#""frames":"#);
+    fs::write(&foreign, broken).unwrap();
+    let failed = browser::load(&browser, &foreign, "", 500);
+    assert!(
+        failed.attribute("data-error").is_some(),
+        "an error goes unnoticed"
+    );
+}

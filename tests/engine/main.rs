@@ -1,0 +1,18 @@
+//! The autograd engine, motions and data sets.
+
+// What several of these tests need.
+#[path = "../common/martial_data.rs"]
+mod martial_data;
+#[path = "../common/real_data.rs"]
+mod real_data;
+
+mod dance_clip;
+
+// The tests.
+mod autograd;
+mod bvh;
+mod choreography;
+mod dataset;
+mod features;
+mod fit;
+mod mapping;

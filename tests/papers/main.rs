@@ -1,0 +1,25 @@
+//! The models of the papers: what they compute, how they train and what they score.
+
+// What several of these tests need.
+#[path = "../common/generated_data.rs"]
+mod generated_data;
+#[path = "../common/small_run.rs"]
+mod small_run;
+
+mod network;
+mod small_training;
+
+// The tests.
+mod baselines;
+mod golden;
+mod golden_run;
+mod harvey2020;
+mod interpolation;
+mod metrics;
+mod pan2021;
+mod preferred;
+mod step_batches;
+mod synthesis;
+mod tables;
+mod training;
+mod velocity_refinement;
