@@ -34,7 +34,13 @@ pub(super) mod gradient {
 
     /// With and without dropout, and with one value as both summands.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 2usize..9, any::<bool>(), any::<bool>(), any::<u64>())
+        (
+            0usize..4,
+            2usize..9,
+            any::<bool>(),
+            any::<bool>(),
+            any::<u64>(),
+        )
             .prop_map(|(rows, n, dropout, same, seed)| {
                 let shapes: [&[usize]; 4] = [&[rows, n], &[rows, n], &[n], &[n]];
                 case(&shapes, seed, 0.3, move |tape, v| {

@@ -94,7 +94,13 @@ struct Sum<'w, T> {
 
 impl<T: Real> Attention<T> {
     /// Adds the sums to the gradient of `of`.
-    fn add_sums(&self, context: &mut Backward<'_, T>, of: Operand, sum: Sum<'_, T>, scratch: &mut [T]) {
+    fn add_sums(
+        &self,
+        context: &mut Backward<'_, T>,
+        of: Operand,
+        sum: Sum<'_, T>,
+        scratch: &mut [T],
+    ) {
         let Some(target) = context.target(of.columns.value) else {
             return;
         };
@@ -309,7 +315,15 @@ impl<T: Real> Tape<'_, T> {
         let scale = 1.0 / (shape.head_width() as f64).sqrt();
         let output = [windows * shape.queries, shape.width];
         let sizes = (windows, shape);
-        Ok(record(self, "attention", operands, sizes, scale, p, &output))
+        Ok(record(
+            self,
+            "attention",
+            operands,
+            sizes,
+            scale,
+            p,
+            &output,
+        ))
     }
 
     /// Number of windows of `tokens` rows in a value that holds the columns of all heads.
@@ -348,32 +362,45 @@ pub(super) mod gradient {
     /// Self-attention with Q, K, V in one value, and attention between two values; with and without dropout; more keys than
     /// a padded chunk; small scores and large.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11, any::<bool>(), strength(), any::<u64>())
-            .prop_map(|(windows, heads, head_width, queries, keys, dropout, strength, seed)| {
-                let width = heads * head_width;
-                let shapes: [&[usize]; 2] =
-                    [&[windows * queries, 3 * width], &[windows * keys, 2 * width]];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    let asking = tape.affine(v[0], strength, 0.0);
-                    let columns = |value, k: usize| HeadColumns {
-                        value,
-                        start: k * width,
-                    };
-                    let mut shape = AttentionShape {
-                        heads,
-                        width,
-                        queries,
-                        keys: queries,
-                    };
-                    let (q, k, w) = (columns(asking, 0), columns(v[0], 1), columns(v[0], 2));
-                    let own = tape.attention(q, k, w, shape, 0.3)?;
-                    shape.keys = keys;
-                    let (k, w) = (columns(v[1], 0), columns(v[1], 1));
-                    let other = tape.attention(q, k, w, shape, 0.3)?;
-                    tape.add(own, other)
-                })
-            })
+        (
+            0usize..3,
+            1usize..3,
+            1usize..3,
+            1usize..4,
+            1usize..11,
+            any::<bool>(),
+            strength(),
+            any::<u64>(),
+        )
+            .prop_map(
+                |(windows, heads, head_width, queries, keys, dropout, strength, seed)| {
+                    let width = heads * head_width;
+                    let shapes: [&[usize]; 2] = [
+                        &[windows * queries, 3 * width],
+                        &[windows * keys, 2 * width],
+                    ];
+                    case(&shapes, seed, 0.0, move |tape, v| {
+                        tape.set_dropout(dropout.then_some(seed));
+                        let asking = tape.affine(v[0], strength, 0.0);
+                        let columns = |value, k: usize| HeadColumns {
+                            value,
+                            start: k * width,
+                        };
+                        let mut shape = AttentionShape {
+                            heads,
+                            width,
+                            queries,
+                            keys: queries,
+                        };
+                        let (q, k, w) = (columns(asking, 0), columns(v[0], 1), columns(v[0], 2));
+                        let own = tape.attention(q, k, w, shape, 0.3)?;
+                        shape.keys = keys;
+                        let (k, w) = (columns(v[1], 0), columns(v[1], 1));
+                        let other = tape.attention(q, k, w, shape, 0.3)?;
+                        tape.add(own, other)
+                    })
+                },
+            )
             .boxed()
     }
 }

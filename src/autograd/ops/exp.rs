@@ -10,13 +10,7 @@ use crate::autograd::{Real, Tape, Var};
 impl<T: Real> Tape<'_, T> {
     /// exp(x), elementwise.
     pub fn exp(&mut self, x: Var) -> Var {
-        unary(
-            self,
-            "exp",
-            x,
-            T::exp_slice,
-            |_, y| y,
-        )
+        unary(self, "exp", x, T::exp_slice, |_, y| y)
     }
 }
 

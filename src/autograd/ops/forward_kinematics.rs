@@ -46,7 +46,10 @@ impl<T: Real> Operation<T> for ForwardKinematics<T> {
                         let above: Quaternion<T> = at(world, parent);
                         let offset: Vector<T> = at(&offsets[body..], joint);
                         add(&mut dp[3 * parent..], g);
-                        add(&mut dworld[4 * parent..], rotation_gradient(above, offset, g));
+                        add(
+                            &mut dworld[4 * parent..],
+                            rotation_gradient(above, offset, g),
+                        );
                         let own: Quaternion<T> = at(local, joint);
                         add(&mut dworld[4 * parent..], product(dq, conjugate(own)));
                         (rotate(conjugate(above), g), product(conjugate(above), dq))
@@ -90,7 +93,12 @@ impl<T: Real> Tape<'_, T> {
             let argument = format!("parents {parents:?}");
             let expected = "at least one joint, each after its parent";
             let shape = self.shape(rotations);
-            return Err(argument_error("forward_kinematics", shape, argument, expected));
+            return Err(argument_error(
+                "forward_kinematics",
+                shape,
+                argument,
+                expected,
+            ));
         }
         let (left, right) = (self.shape(rotations), self.shape(offsets));
         let (rows, bodies) = match (left, right) {
@@ -115,7 +123,8 @@ impl<T: Real> Tape<'_, T> {
             let positions = &mut positions[row * 3 * joints..(row + 1) * 3 * joints];
             let world = &mut world[row * 4 * joints..(row + 1) * 4 * joints];
             for (joint, &parent) in parents.iter().enumerate() {
-                let (own, offset): (Quaternion<T>, Vector<T>) = (at(local, joint), at(offsets, joint));
+                let (own, offset): (Quaternion<T>, Vector<T>) =
+                    (at(local, joint), at(offsets, joint));
                 let (position, rotation) = match parent {
                     None => (offset, own),
                     Some(parent) => {
@@ -130,7 +139,10 @@ impl<T: Real> Tape<'_, T> {
             }
         }
         // Without a gradient to take the operation is not kept.
-        if ![rotations, offsets].iter().any(|&input| self.needs_gradient(input)) {
+        if ![rotations, offsets]
+            .iter()
+            .any(|&input| self.needs_gradient(input))
+        {
             self.give(std::mem::take(&mut world));
         }
         let (inputs, shape) = ([rotations, offsets], [rows, 3 * joints]);
@@ -226,8 +238,7 @@ pub(super) mod gradient {
                     .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
                     .collect();
                 let joints = parents.len();
-                let shapes: [&[usize]; 2] =
-                    [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
+                let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
                 case(&shapes, seed, 0.0, move |tape, v| {
                     let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
                     // Deep trees of long quaternions grow large.

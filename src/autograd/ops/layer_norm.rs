@@ -141,8 +141,7 @@ pub(super) fn layer_norm<T: Real>(
                 {
                     let (z, g, b) = (&mut z[..columns], &g[..columns], &b[..columns]);
                     let mean = sum_with(columns, |j| z[j]) * scale;
-                    let variance =
-                        sum_with(columns, |j| (z[j] - mean) * (z[j] - mean)) * scale;
+                    let variance = sum_with(columns, |j| (z[j] - mean) * (z[j] - mean)) * scale;
                     let inverse = T::one() / (variance + T::from_f64(EPS)).sqrt();
                     for j in 0..columns {
                         z[j] = (z[j] - mean) * inverse * g[j] + b[j];

@@ -6,9 +6,7 @@
 //! ```
 
 use super::shapes_error;
-use crate::autograd::kernels::{
-    Mat, MatMut, product, product_bt, product_packed, vectorised,
-};
+use crate::autograd::kernels::{Mat, MatMut, product, product_bt, product_packed, vectorised};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Linear {
@@ -174,10 +172,21 @@ pub(super) mod gradient {
 
     /// The layer is applied twice, so that its weight's gradient adds up.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 0usize..4, 0usize..4, any::<bool>(), any::<bool>(), any::<u64>())
+        (
+            0usize..4,
+            0usize..4,
+            0usize..4,
+            any::<bool>(),
+            any::<bool>(),
+            any::<u64>(),
+        )
             .prop_map(|(rows, inputs, outputs, bias, relu, seed)| {
-                let shapes: [&[usize]; 4] =
-                    [&[rows, inputs], &[2, 1, inputs], &[outputs, inputs], &[outputs]];
+                let shapes: [&[usize]; 4] = [
+                    &[rows, inputs],
+                    &[2, 1, inputs],
+                    &[outputs, inputs],
+                    &[outputs],
+                ];
                 case(&shapes, seed, 0.0, move |tape, v| {
                     let bias = bias.then_some(v[3]);
                     let first = tape.linear(v[0], v[2], bias, relu)?;

@@ -94,7 +94,10 @@ impl<T: Real> Operation<T> for LstmCell<T> {
                 if fresh {
                     target[n..].copy_from_slice(&dy[n..]);
                 } else {
-                    target[n..].iter_mut().zip(&dy[n..]).for_each(|(t, &d)| *t += d);
+                    target[n..]
+                        .iter_mut()
+                        .zip(&dy[n..])
+                        .for_each(|(t, &d)| *t += d);
                 }
             }
             let dh = MatMut::strided(target.data, batch, n, 2 * n);
@@ -196,15 +199,17 @@ impl<T: Real> Tape<'_, T> {
             self.give(std::mem::take(&mut gates));
         }
         let all = [x, state, weight_ih, weight_hh, bias_ih, bias_hh];
-        Ok(self.record("lstm_cell", &all, &[batch, 2 * n], y, || LstmCell {
-            x,
-            state,
-            weights,
-            batch,
-            inputs,
-            hidden: n,
-            gates,
-        }))
+        Ok(
+            self.record("lstm_cell", &all, &[batch, 2 * n], y, || LstmCell {
+                x,
+                state,
+                weights,
+                batch,
+                inputs,
+                hidden: n,
+                gates,
+            }),
+        )
     }
 }
 

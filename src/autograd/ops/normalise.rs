@@ -25,7 +25,9 @@ impl<T: Real> Operation<T> for Normalise<T> {
         for (dy, (x, y)) in dy.chunks_exact_mut(width).zip(vectors) {
             let along = sum_with(width, |i| y[i] * dy[i]);
             let n = length(x, self.eps);
-            dy.iter_mut().zip(y).for_each(|(dy, &y)| *dy = (*dy - y * along) / n);
+            dy.iter_mut()
+                .zip(y)
+                .for_each(|(dy, &y)| *dy = (*dy - y * along) / n);
         }
         if let Some(target) = context.target(self.x) {
             target.add(|i| dy[i]);
@@ -69,7 +71,9 @@ pub(super) mod gradient {
                 if let Some(last) = x.last_mut() {
                     *last *= width;
                 }
-                case(&[&x], seed, 0.1, move |tape, v| tape.normalise(v[0], width, 1e-3))
+                case(&[&x], seed, 0.1, move |tape, v| {
+                    tape.normalise(v[0], width, 1e-3)
+                })
             })
             .boxed()
     }

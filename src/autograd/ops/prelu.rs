@@ -80,9 +80,7 @@ pub(super) mod gradient {
 
     pub fn cases() -> BoxedStrategy<Case> {
         (shapes(), any::<u64>())
-            .prop_map(|(x, seed)| {
-                case(&[&x, &[1]], seed, 0.01, |tape, v| tape.prelu(v[0], v[1]))
-            })
+            .prop_map(|(x, seed)| case(&[&x, &[1]], seed, 0.01, |tape, v| tape.prelu(v[0], v[1])))
             .boxed()
     }
 }

@@ -87,7 +87,13 @@ struct QueryAttention<T> {
 }
 
 /// The columns of one head in `values [rows, stride]`, for reading.
-fn columns<T: Real>(values: &[T], rows: usize, stride: usize, start: usize, n: usize) -> Mat<'_, T> {
+fn columns<T: Real>(
+    values: &[T],
+    rows: usize,
+    stride: usize,
+    start: usize,
+    n: usize,
+) -> Mat<'_, T> {
     if rows == 0 {
         return Mat::new(&[], 0, n);
     }
@@ -179,7 +185,10 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
                 target.data.fill(T::zero());
             }
             for (row, dy) in dy.chunks_exact(dh).enumerate() {
-                let sum: T = self.m[row * padded..(row + 1) * padded].iter().copied().sum();
+                let sum: T = self.m[row * padded..(row + 1) * padded]
+                    .iter()
+                    .copied()
+                    .sum();
                 let head = row % heads;
                 let db = &mut target.data[head * dh..(head + 1) * dh];
                 db.iter_mut().zip(dy).for_each(|(db, &dy)| *db += dy * sum);
@@ -310,7 +319,14 @@ impl<T: Real> Tape<'_, T> {
                 None => product(q_h, Mat::new(self.values(weight), dh, width), u_h, false),
             }
         }
-        scores(&mut attention, &u, tokens_x, sizes, sizes.scale(), &mut scratch);
+        scores(
+            &mut attention,
+            &u,
+            tokens_x,
+            sizes,
+            sizes.scale(),
+            &mut scratch,
+        );
         vectorised(
             #[inline(always)]
             || window_softmax(&mut attention, tokens),
@@ -344,16 +360,18 @@ impl<T: Real> Tape<'_, T> {
             }
         }
         Ok(
-            self.record("query_attention", &inputs, &[batch, all], y, || QueryAttention {
-                q,
-                x,
-                weights,
-                sizes,
-                dropout,
-                u,
-                p: attention,
-                m,
-                z,
+            self.record("query_attention", &inputs, &[batch, all], y, || {
+                QueryAttention {
+                    q,
+                    x,
+                    weights,
+                    sizes,
+                    dropout,
+                    u,
+                    p: attention,
+                    m,
+                    z,
+                }
             }),
         )
     }
@@ -368,11 +386,21 @@ impl<T: Real> Tape<'_, T> {
         const NAME: &str = "query_attention";
         let (&[batch, all], &[rows, width]) = (self.shape(q), self.shape(x)) else {
             let (left, right) = (self.shape(q), self.shape(x));
-            return Err(shapes_error(NAME, left, right, "q [B, d] and x [B * n, d']"));
+            return Err(shapes_error(
+                NAME,
+                left,
+                right,
+                "q [B, d] and x [B * n, d']",
+            ));
         };
         if tokens == 0 || rows != batch * tokens || width == 0 {
             let (left, right) = (self.shape(q), self.shape(x));
-            return Err(shapes_error(NAME, left, right, "q [B, d] and x [B * n, d']"));
+            return Err(shapes_error(
+                NAME,
+                left,
+                right,
+                "q [B, d] and x [B * n, d']",
+            ));
         }
         let heads = weights.keys.len();
         if heads == 0 || weights.values.len() != heads || all == 0 || all % heads != 0 {
@@ -411,7 +439,15 @@ pub(super) mod gradient {
 
     /// Two heads that share no weight, with and without dropout; small scores and large.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..10, 1usize..3, 1usize..4, any::<bool>(), strength(), any::<u64>())
+        (
+            0usize..3,
+            1usize..10,
+            1usize..3,
+            1usize..4,
+            any::<bool>(),
+            strength(),
+            any::<u64>(),
+        )
             .prop_map(|(batch, tokens, dh, width, dropout, strength, seed)| {
                 let weight: &[usize] = &[dh, width];
                 let shapes: [&[usize]; 7] = [

@@ -14,7 +14,15 @@ impl<T: Real> Tape<'_, T> {
             self,
             "relu",
             x,
-            |values| values.iter_mut().for_each(|x| *x = if *x > T::zero() || x.is_nan() { *x } else { T::zero() }),
+            |values| {
+                values.iter_mut().for_each(|x| {
+                    *x = if *x > T::zero() || x.is_nan() {
+                        *x
+                    } else {
+                        T::zero()
+                    }
+                })
+            },
             |x, _| if x > T::zero() { T::one() } else { T::zero() },
         )
     }

@@ -63,7 +63,9 @@ pub(super) mod gradient {
             .prop_map(|(x, ends, seed)| {
                 let (a, b) = (ends[0].index(x[0] + 1), ends[1].index(x[0] + 1));
                 let range = a.min(b)..a.max(b);
-                case(&[&x], seed, 0.0, move |tape, v| tape.rows(v[0], range.clone()))
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    tape.rows(v[0], range.clone())
+                })
             })
             .boxed()
     }

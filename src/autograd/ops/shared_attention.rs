@@ -49,7 +49,15 @@ impl<T: Real> Tape<'_, T> {
         let operands = (operand(q), operand(x), operand(x));
         let sizes = (rows / tokens, shape);
         let output = [rows, all];
-        Ok(record(self, "shared_attention", operands, sizes, scale, p, &output))
+        Ok(record(
+            self,
+            "shared_attention",
+            operands,
+            sizes,
+            scale,
+            p,
+            &output,
+        ))
     }
 }
 
@@ -61,13 +69,26 @@ pub(super) mod gradient {
 
     /// With and without dropout; more tokens than a padded chunk; small scores and large.
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..11, 1usize..4, 1usize..4, any::<bool>(), strength(), any::<u64>())
+        (
+            0usize..3,
+            1usize..11,
+            1usize..4,
+            1usize..4,
+            any::<bool>(),
+            strength(),
+            any::<u64>(),
+        )
             .prop_map(|(windows, tokens, heads, width, dropout, strength, seed)| {
                 let rows = windows * tokens;
-                case(&[&[rows, heads * width], &[rows, width]], seed, 0.0, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
-                })
+                case(
+                    &[&[rows, heads * width], &[rows, width]],
+                    seed,
+                    0.0,
+                    move |tape, v| {
+                        tape.set_dropout(dropout.then_some(seed));
+                        tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
+                    },
+                )
             })
             .boxed()
     }

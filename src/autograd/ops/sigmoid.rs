@@ -10,13 +10,9 @@ use crate::autograd::{Real, Tape, Var};
 impl<T: Real> Tape<'_, T> {
     /// 1 / (1 + exp(-x)), elementwise.
     pub fn sigmoid(&mut self, x: Var) -> Var {
-        unary(
-            self,
-            "sigmoid",
-            x,
-            T::sigmoid_slice,
-            |_, y| y * (T::one() - y),
-        )
+        unary(self, "sigmoid", x, T::sigmoid_slice, |_, y| {
+            y * (T::one() - y)
+        })
     }
 }
 

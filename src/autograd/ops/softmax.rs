@@ -85,10 +85,12 @@ pub(super) mod gradient {
 
     pub fn cases() -> BoxedStrategy<Case> {
         (shapes(), strength(), any::<u64>())
-            .prop_map(|(x, strength, seed)| case(&[&x], seed, 0.0, move |tape, v| {
-                let logits = tape.affine(v[0], strength, 0.0);
-                Ok(tape.softmax(logits))
-            }))
+            .prop_map(|(x, strength, seed)| {
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    let logits = tape.affine(v[0], strength, 0.0);
+                    Ok(tape.softmax(logits))
+                })
+            })
             .boxed()
     }
 }

@@ -28,11 +28,13 @@ pub(super) mod gradient {
 
     pub fn cases() -> BoxedStrategy<Case> {
         (shapes(), any::<u64>())
-            .prop_map(|(x, seed)| case(&[&x], seed, 0.0, |tape, v| {
-                let square = tape.square(v[0]);
-                let shift = tape.affine(square, 1.0, 0.3);
-                Ok(tape.sqrt(shift))
-            }))
+            .prop_map(|(x, seed)| {
+                case(&[&x], seed, 0.0, |tape, v| {
+                    let square = tape.square(v[0]);
+                    let shift = tape.affine(square, 1.0, 0.3);
+                    Ok(tape.sqrt(shift))
+                })
+            })
             .boxed()
     }
 }

@@ -80,7 +80,13 @@ pub(super) mod gradient {
     use crate::autograd::check::property::{Case, case};
 
     pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 1usize..4, 0usize..3, any::<prop::sample::Index>(), any::<u64>())
+        (
+            0usize..4,
+            1usize..4,
+            0usize..3,
+            any::<prop::sample::Index>(),
+            any::<u64>(),
+        )
             .prop_map(|(n, step, width, start, seed)| {
                 let start = start.index(step);
                 case(&[&[n * step, width]], seed, 0.0, move |tape, v| {

@@ -30,7 +30,12 @@ impl<T: Real> Tape<'_, T> {
     pub fn sum_last(&mut self, x: Var) -> Result<Var, AutogradError> {
         let Some((&columns, shape)) = self.shape(x).split_last() else {
             let argument = "its last axis".into();
-            return Err(argument_error("sum_last", &[], argument, "one axis or more"));
+            return Err(argument_error(
+                "sum_last",
+                &[],
+                argument,
+                "one axis or more",
+            ));
         };
         let shape = shape.to_vec();
         let mut y = self.take(shape.iter().product());

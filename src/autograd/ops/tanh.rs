@@ -10,13 +10,7 @@ use crate::autograd::{Real, Tape, Var};
 impl<T: Real> Tape<'_, T> {
     /// tanh(x), elementwise.
     pub fn tanh(&mut self, x: Var) -> Var {
-        unary(
-            self,
-            "tanh",
-            x,
-            T::tanh_slice,
-            |_, y| T::one() - y * y,
-        )
+        unary(self, "tanh", x, T::tanh_slice, |_, y| T::one() - y * y)
     }
 }
 
