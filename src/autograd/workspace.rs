@@ -49,13 +49,6 @@ impl<T: Real> Workspace<T> {
         buffer
     }
 
-    /// A buffer of `len` zeros.
-    pub fn take_zeroed(&mut self, len: usize) -> Vec<T> {
-        let mut buffer = self.take(len);
-        buffer.fill(T::zero());
-        buffer
-    }
-
     /// Gives a buffer back. One that did not come from here is kept only if its capacity is that of a class.
     pub fn give(&mut self, buffer: Vec<T>) {
         let capacity = buffer.capacity();

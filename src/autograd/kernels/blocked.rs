@@ -63,6 +63,22 @@ pub struct Rows {
     pub half_direct: Kernel,
 }
 
+/// [`Rows`] of an instruction set's `tile`s: numbers of rows, each times the panels of the wide one.
+macro_rules! rows {
+    ($($rows:literal * $panels:literal),*) => {
+        &[$(Rows {
+            panels: $panels,
+            wide: tile::<$rows, $panels, 2, false>,
+            single: tile::<$rows, 1, 2, false>,
+            half: tile::<$rows, 1, 1, false>,
+            wide_direct: tile::<$rows, $panels, 2, true>,
+            single_direct: tile::<$rows, 1, 2, true>,
+            half_direct: tile::<$rows, 1, 1, true>,
+        }),*]
+    };
+}
+pub(super) use rows;
+
 /// The kernels of an instruction set.
 pub struct Kernels {
     /// Columns of a panel.

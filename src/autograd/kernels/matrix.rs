@@ -148,16 +148,6 @@ impl<'a, T> Operand<'a, T> {
         }
     }
 
-    /// `rows` rows of `cols` numbers without gaps.
-    #[inline]
-    #[track_caller]
-    pub fn rows_of(data: &'a [T], rows: usize, cols: usize) -> Self {
-        Self {
-            matrix: Mat::new(data, rows, cols),
-            transposed: false,
-        }
-    }
-
     /// Number of rows of the operand.
     #[inline]
     pub fn rows(&self) -> usize {
