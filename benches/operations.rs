@@ -215,7 +215,7 @@ fn layers(c: &mut Criterion) {
                 queries: TOKENS,
                 keys: TOKENS,
             };
-            tape.attention(columns(0), columns(1), columns(2), shape, 0.0)
+            tape.attention([0, 1, 2].map(columns), shape, None, 0.0)
         },
         |x| {
             x[0].chunks_exact(TOKENS * 3 * D)

@@ -3,7 +3,9 @@
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::error::AutogradError;
-use super::kernels::{Mat, MatMut, Packed, Real, product_at};
+use super::kernels::{
+    Mat, MatMut, Real, product, product_at, product_bt, product_packed, vectorised,
+};
 use super::parameters::{BlockId, Gradients, Parameters};
 use super::staging::{DIRECT_ROWS, Staging};
 use super::workspace::Workspace;
@@ -113,13 +115,14 @@ impl<'a, T: Real> Tape<'a, T> {
         self.recording
     }
 
-    /// A key for the draws of the next operation, where dropout is on.
-    pub(super) fn next_dropout_key(&self) -> Option<u64> {
-        self.dropout_key.map(|key| {
+    /// A key for the draws of the next operation beside their `strength`, where dropout is on and that above 0.
+    pub(super) fn next_draws(&self, strength: f64) -> Option<(u64, f64)> {
+        let key = self.dropout_key.filter(|_| strength > 0.0);
+        key.map(|key| {
             let mut x = key ^ (self.nodes.len() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            x ^ (x >> 31)
+            (x ^ (x >> 31), strength)
         })
     }
 
@@ -192,17 +195,17 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     pub fn shape(&self, var: Var) -> &[usize] {
-        shape_of(&self.nodes, self.parameters, var)
+        self.known().shape(var)
     }
 
     /// The numbers of a value in row-major order.
     pub fn values(&self, var: Var) -> &[T] {
-        values_of(&self.nodes, self.parameters, var)
+        self.known().values(var)
     }
 
     /// A value as an array.
     pub fn array(&self, var: Var) -> ArrayViewD<'_, T> {
-        array_of(&self.nodes, self.parameters, var)
+        self.known().array(var)
     }
 
     /// Rows and columns of a value seen as a matrix: the last axis, and all before it.
@@ -225,18 +228,10 @@ impl<'a, T: Real> Tape<'a, T> {
         self.workspace.give(buffer);
     }
 
-    /// The packed transpose of a weight W [out, in], where it is a parameter.
-    pub(super) fn packed_transposed(&self, weight: Var) -> Option<&'a Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed_transposed(id)),
-            _ => None,
-        }
-    }
-
-    pub(super) fn packed(&self, weight: Var) -> Option<&'a Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed(id)),
-            _ => None,
+    pub(super) fn known(&self) -> Known<'_, T> {
+        Known {
+            nodes: &self.nodes,
+            parameters: self.parameters,
         }
     }
 
@@ -383,8 +378,10 @@ impl<'a, T: Real> Tape<'a, T> {
         for index in (0..self.nodes.len()).rev() {
             let operation = self.nodes[index].operation.take();
             let mut context = Backward {
-                nodes: &self.nodes[..=index],
-                parameters: self.parameters,
+                known: Known {
+                    nodes: &self.nodes[..=index],
+                    parameters: self.parameters,
+                },
                 workspace: self.workspace,
                 slots: &mut slots,
                 stagings: &mut stagings,
@@ -394,22 +391,12 @@ impl<'a, T: Real> Tape<'a, T> {
             };
             context.flush_staging(Var(index as u32));
             if let Some(mut operation) = operation {
-                if let Some(mut dy) = slots[index].take() {
+                if let Some(mut dy) = context.slots[index].take() {
                     if self.trace
                         && let Some(what) = not_finite(&dy)
                     {
                         return Err(self.non_finite(index, what, "gradient"));
                     }
-                    let mut context = Backward {
-                        nodes: &self.nodes[..=index],
-                        parameters: self.parameters,
-                        workspace: self.workspace,
-                        slots: &mut slots,
-                        stagings: &mut stagings,
-                        gradients,
-                        output: Var(index as u32),
-                        staged: !self.trace,
-                    };
                     operation.backward(&mut dy, &mut context);
                     if self.trace
                         && let Some(what) = self.nodes[index].inputs.iter().find_map(|input| {
@@ -475,39 +462,72 @@ fn release<T: Real>(node: &mut Node<T>, workspace: &mut Workspace<T>) {
     }
 }
 
-fn shape_of<'s, T: Real>(
+/// What is on a tape so far, for reading.
+pub(super) struct Known<'s, T: Real> {
     nodes: &'s [Node<T>],
     parameters: &'s Parameters<T>,
-    var: Var,
-) -> &'s [usize] {
-    match &nodes[var.index()].value {
-        Value::Array(array) => array.shape(),
-        Value::Block(id) => parameters.block_shape(*id),
-        Value::Released => &[],
+}
+
+impl<T: Real> Clone for Known<'_, T> {
+    fn clone(&self) -> Self {
+        *self
     }
 }
 
-fn values_of<'s, T: Real>(
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    var: Var,
-) -> &'s [T] {
-    match &nodes[var.index()].value {
-        // Every array on the tape is in standard layout.
-        Value::Array(array) => array.as_slice().unwrap_or(&[]),
-        Value::Block(id) => parameters.block_values(*id),
-        Value::Released => &[],
-    }
-}
+impl<T: Real> Copy for Known<'_, T> {}
 
-fn array_of<'s, T: Real>(
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    var: Var,
-) -> ArrayViewD<'s, T> {
-    let shape = IxDyn(shape_of(nodes, parameters, var));
-    ArrayViewD::from_shape(shape, values_of(nodes, parameters, var))
-        .expect("a value has as many numbers as its shape says")
+impl<'s, T: Real> Known<'s, T> {
+    fn shape(self, var: Var) -> &'s [usize] {
+        match &self.nodes[var.index()].value {
+            Value::Array(array) => array.shape(),
+            Value::Block(id) => self.parameters.block_shape(*id),
+            Value::Released => &[],
+        }
+    }
+
+    fn values(self, var: Var) -> &'s [T] {
+        match &self.nodes[var.index()].value {
+            // Every array on the tape is in standard layout.
+            Value::Array(array) => array.as_slice().unwrap_or(&[]),
+            Value::Block(id) => self.parameters.block_values(*id),
+            Value::Released => &[],
+        }
+    }
+
+    fn array(self, var: Var) -> ArrayViewD<'s, T> {
+        ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
+            .expect("a value has as many numbers as its shape says")
+    }
+
+    /// A weight `[out, in]` as a matrix.
+    fn matrix(self, weight: Var) -> Mat<'s, T> {
+        let shape = self.shape(weight);
+        Mat::new(self.values(weight), shape[0], shape[1])
+    }
+
+    /// out (+)= x W for a weight W `[out, in]`, packed where it is a parameter.
+    pub(super) fn product(self, x: Mat<'_, T>, weight: Var, out: MatMut<'_, T>, accumulate: bool) {
+        match self.nodes[weight.index()].value {
+            Value::Block(id) => product_packed(x, self.parameters.packed(id), out, accumulate),
+            _ => product(x, self.matrix(weight), out, accumulate),
+        }
+    }
+
+    /// out (+)= x W^T for a weight W `[out, in]`, packed where it is a parameter.
+    pub(super) fn product_transposed(
+        self,
+        x: Mat<'_, T>,
+        weight: Var,
+        out: MatMut<'_, T>,
+        accumulate: bool,
+    ) {
+        match self.nodes[weight.index()].value {
+            Value::Block(id) => {
+                product_packed(x, self.parameters.packed_transposed(id), out, accumulate);
+            }
+            _ => product_bt(x, self.matrix(weight), out, accumulate),
+        }
+    }
 }
 
 fn not_finite<T: Real>(values: &[T]) -> Option<&'static str> {
@@ -531,7 +551,7 @@ impl<T: Real> Target<'_, T> {
             self.data.copy_from_slice(values);
             return;
         }
-        super::kernels::vectorised(
+        vectorised(
             #[inline(always)]
             || {
                 for (d, &value) in self.data.iter_mut().zip(values) {
@@ -545,7 +565,7 @@ impl<T: Real> Target<'_, T> {
     #[inline(always)]
     pub fn add(self, gradient: impl Fn(usize) -> T) {
         let fresh = self.fresh;
-        super::kernels::vectorised(
+        vectorised(
             #[inline(always)]
             || {
                 if fresh {
@@ -564,8 +584,7 @@ impl<T: Real> Target<'_, T> {
 
 /// What an operation sees on the way back: the values before it, and the gradients it adds to.
 pub struct Backward<'s, T: Real> {
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
+    known: Known<'s, T>,
     workspace: &'s mut Workspace<T>,
     slots: &'s mut [Option<Vec<T>>],
     stagings: &'s mut [Option<Staging<T>>],
@@ -578,16 +597,16 @@ pub struct Backward<'s, T: Real> {
 impl<'s, T: Real> Backward<'s, T> {
     /// The numbers of an earlier value in row-major order.
     pub fn values(&self, var: Var) -> &'s [T] {
-        values_of(self.nodes, self.parameters, var)
+        self.known.values(var)
     }
 
     pub fn shape(&self, var: Var) -> &'s [usize] {
-        shape_of(self.nodes, self.parameters, var)
+        self.known.shape(var)
     }
 
     /// An earlier value as an array.
     pub fn array(&self, var: Var) -> ArrayViewD<'s, T> {
-        array_of(self.nodes, self.parameters, var)
+        self.known.array(var)
     }
 
     /// The operation's own output.
@@ -595,8 +614,12 @@ impl<'s, T: Real> Backward<'s, T> {
         self.values(self.output)
     }
 
+    pub(super) fn known(&self) -> Known<'s, T> {
+        self.known
+    }
+
     pub fn needs_gradient(&self, var: Var) -> bool {
-        self.nodes[var.index()].needs_gradient
+        self.known.nodes[var.index()].needs_gradient
     }
 
     pub fn take(&mut self, len: usize) -> Vec<T> {
@@ -609,13 +632,13 @@ impl<'s, T: Real> Backward<'s, T> {
 
     /// Where to add the gradient of an input, if it wants one.
     pub fn target(&mut self, var: Var) -> Option<Target<'_, T>> {
-        let node = &self.nodes[var.index()];
+        let node = &self.known.nodes[var.index()];
         if !node.needs_gradient {
             return None;
         }
         match &node.value {
             Value::Block(id) => Some(Target {
-                data: self.gradients.block_mut(self.parameters, *id),
+                data: self.gradients.block_mut(self.known.parameters, *id),
                 fresh: false,
             }),
             Value::Array(array) => {
@@ -625,21 +648,6 @@ impl<'s, T: Real> Backward<'s, T> {
                 Some(Target { data, fresh })
             }
             Value::Released => None,
-        }
-    }
-
-    /// The weight W [out, in], packed for `dy W`, where it is a parameter.
-    pub fn packed(&self, weight: Var) -> Option<&'s Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed(id)),
-            _ => None,
-        }
-    }
-
-    pub fn packed_transposed(&self, weight: Var) -> Option<&'s Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed_transposed(id)),
-            _ => None,
         }
     }
 

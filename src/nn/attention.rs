@@ -110,13 +110,8 @@ impl MultiHeadAttention {
             start: k * self.sizes.width,
         };
         let shape = self.shape(tokens, tokens);
-        let y = tape.attention(
-            columns(0),
-            columns(1),
-            columns(2),
-            shape,
-            self.sizes.dropout,
-        )?;
+        let operands = [0, 1, 2].map(columns);
+        let y = tape.attention(operands, shape, None, self.sizes.dropout)?;
         self.output.forward(tape, y)
     }
 
@@ -218,7 +213,8 @@ impl MultiHeadAttention {
         };
         let queries = HeadColumns { value, start: 0 };
         let shape = self.shape(tokens, tokens);
-        let y = tape.attention(queries, columns(0), columns(1), shape, self.sizes.dropout)?;
+        let operands = [queries, columns(0), columns(1)];
+        let y = tape.attention(operands, shape, None, self.sizes.dropout)?;
         self.output.forward(tape, y)
     }
 

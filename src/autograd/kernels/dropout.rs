@@ -71,3 +71,15 @@ pub fn dropout_into<T: Real>(key: u64, p: f64, x: &[T], out: &mut [T]) {
         },
     );
 }
+
+/// [`dropout_into`] with a stream's key and probability, or a copy where there is no dropout.
+///
+/// # Panics
+/// As [`dropout_into`].
+#[track_caller]
+pub fn dropped_into<T: Real>(dropout: Option<(u64, f64)>, x: &[T], out: &mut [T]) {
+    match dropout {
+        Some((key, p)) => dropout_into(key, p, x, out),
+        None => out.copy_from_slice(x),
+    }
+}

@@ -17,10 +17,7 @@ impl<T: Real> Tape<'_, T> {
         (gamma, beta): (Var, Var),
         p: f64,
     ) -> Result<Var, AutogradError> {
-        let dropout = self
-            .next_dropout_key()
-            .filter(|_| p > 0.0)
-            .map(|key| (key, p));
+        let dropout = self.next_draws(p);
         let name = "add_layer_norm";
         layer_norm(self, name, x, Some(residual), (gamma, beta), dropout)
     }

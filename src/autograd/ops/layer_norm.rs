@@ -7,7 +7,7 @@
 //! ```
 
 use super::shapes_error;
-use crate::autograd::kernels::{dropout_into, vectorised};
+use crate::autograd::kernels::{dropout_into, dropped_into, vectorised};
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
@@ -26,10 +26,7 @@ pub(super) struct LayerNorm<T> {
 
 /// z = residual + dropout(x), in a buffer.
 fn sum_into<T: Real>(z: &mut [T], x: &[T], residual: Option<&[T]>, dropout: Option<(u64, f64)>) {
-    match dropout {
-        Some((key, p)) => dropout_into(key, p, x, z),
-        None => z.copy_from_slice(x),
-    }
+    dropped_into(dropout, x, z);
     if let Some(residual) = residual {
         vectorised(
             #[inline(always)]

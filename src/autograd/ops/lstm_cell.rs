@@ -8,7 +8,7 @@
 
 use super::linear::{bias_gradient, input_gradient};
 use super::shapes_error;
-use crate::autograd::kernels::{Mat, MatMut, product, product_bt, product_packed, vectorised};
+use crate::autograd::kernels::{Mat, MatMut, vectorised};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
 /// Weights of an LSTM cell on a tape, named and laid out as in PyTorch.
@@ -80,10 +80,10 @@ impl<T: Real> Operation<T> for LstmCell<T> {
         let d = Mat::new(&dgates, batch, 4 * n);
         let x = Mat::new(context.values(self.x), batch, self.inputs);
         context.weight_gradient(w.weight_ih, d, x);
-        context.weight_gradient(w.weight_hh, d, Mat::strided(before, batch, n, 2 * n));
-        input_gradient(context, self.x, w.weight_ih, d, self.inputs);
-        let packed = context.packed(w.weight_hh);
-        let weight = context.values(w.weight_hh);
+        let h = Mat::new(before, batch, 2 * n).columns(0..n);
+        context.weight_gradient(w.weight_hh, d, h);
+        input_gradient(context, self.x, w.weight_ih, d);
+        let known = context.known();
         if let Some(target) = context.target(self.state) {
             let fresh = target.fresh;
             for (target, dy) in target
@@ -100,11 +100,8 @@ impl<T: Real> Operation<T> for LstmCell<T> {
                         .for_each(|(t, &d)| *t += d);
                 }
             }
-            let dh = MatMut::strided(target.data, batch, n, 2 * n);
-            match packed {
-                Some(packed) => product_packed(d, packed, dh, !fresh),
-                None => product(d, Mat::new(weight, 4 * n, n), dh, !fresh),
-            }
+            let dh = MatMut::new(target.data, batch, 2 * n).columns(0..n);
+            known.product(d, w.weight_hh, dh, !fresh);
         }
         context.give(dgates);
         context.give(tanh_c);
@@ -157,19 +154,12 @@ impl<T: Real> Tape<'_, T> {
         }
         let mut gates = self.take(batch * 4 * n);
         let before = self.values(state);
-        let h = Mat::strided(before, batch, n, 2 * n);
-        for (weight, input, accumulate) in [
-            (weight_ih, Mat::new(self.values(x), batch, inputs), false),
-            (weight_hh, h, true),
-        ] {
+        let x_matrix = Mat::new(self.values(x), batch, inputs);
+        let h = Mat::new(before, batch, 2 * n).columns(0..n);
+        for (weight, input, accumulate) in [(weight_ih, x_matrix, false), (weight_hh, h, true)] {
             let out = MatMut::new(&mut gates, batch, 4 * n);
-            match self.packed_transposed(weight) {
-                Some(packed) => product_packed(input, packed, out, accumulate),
-                None => {
-                    let weight = Mat::new(self.values(weight), 4 * n, input.cols);
-                    product_bt(input, weight, out, accumulate);
-                }
-            }
+            self.known()
+                .product_transposed(input, weight, out, accumulate);
         }
         let (b_ih, b_hh) = (self.values(bias_ih), self.values(bias_hh));
         for row in gates.chunks_exact_mut(4 * n) {

@@ -9,6 +9,7 @@ mod add;
 mod add_layer_norm;
 mod affine;
 pub mod attention;
+mod attention_core;
 mod broadcast;
 mod clamp;
 mod columns;
@@ -76,7 +77,7 @@ mod gradient_is_that_of_central_differences {
     use crate::autograd::check::property::check;
 
     /// Files of this folder that are no operations.
-    const OTHERS: [&str; 3] = ["mod", "broadcast", "unary"];
+    const OTHERS: [&str; 4] = ["mod", "attention_core", "broadcast", "unary"];
 
     /// A test of each operation on the cases that its file draws: without them it does not compile.
     macro_rules! operations {

@@ -26,7 +26,7 @@ impl<T: Real> Tape<'_, T> {
     /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's dropout; `x` itself where dropout is
     /// off.
     pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
-        let Some(key) = self.next_dropout_key().filter(|_| deviation > 0.0) else {
+        let Some((key, deviation)) = self.next_draws(deviation) else {
             return x;
         };
         let shape = self.shape(x).to_vec();

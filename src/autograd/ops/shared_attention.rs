@@ -7,7 +7,7 @@
 //!
 //! The heads of a token are so many more queries to the same window: the rest is [`super::attention`] with one head.
 
-use super::attention::{AttentionShape, HeadColumns, Operand, record};
+use super::attention::{Attention, AttentionShape, HeadColumns, Operand};
 use super::shapes_error;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 
@@ -46,18 +46,17 @@ impl<T: Real> Tape<'_, T> {
             columns: HeadColumns { value, start: 0 },
             stride: width,
         };
-        let operands = (operand(q), operand(x), operand(x));
-        let sizes = (rows / tokens, shape);
-        let output = [rows, all];
-        Ok(record(
-            self,
-            "shared_attention",
-            operands,
-            sizes,
+        let attention = Attention {
+            q: operand(q),
+            k: operand(x),
+            v: operand(x),
+            bias: None,
+            shape,
             scale,
-            p,
-            &output,
-        ))
+            dropout: self.next_draws(p),
+            probabilities: Vec::new(),
+        };
+        Ok(attention.record(self, "shared_attention", &[rows, all]))
     }
 }
 
