@@ -21,8 +21,8 @@ pub struct ParameterReport {
     pub parameter: String,
     /// Numbers compared.
     pub compared: usize,
-    /// Numbers left out: a kink (a PReLU at 0, a clamp's edge) lies within the smallest step of the difference, and the gradient
-    /// is that of one side.
+    /// Numbers left out: a kink (a PReLU at 0, a clamp's edge) lies within the smallest step of the
+    /// difference, and the gradient is that of one side.
     pub kinks: usize,
     /// The largest disagreement among those compared.
     pub worst: Option<Disagreement>,
@@ -53,23 +53,26 @@ impl CheckReport {
     }
 }
 
-/// Steps of the differences, largest first: a smooth loss is most exact with the first, the others get between kinks.
+/// Steps of the differences, largest first: a smooth loss is most exact with the first, the others
+/// get between kinks.
 const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// Error at which a difference and a gradient agree and no smaller step is tried.
 const AGREES: f64 = 1e-7;
-/// Error at which a one-sided difference, less exact than a central one, and a gradient agree; a central difference with more
-/// may stand at a kink.
+/// Error at which a one-sided difference, less exact than a central one, and a gradient agree; a
+/// central difference with more may stand at a kink.
 const AGREES_ON_ONE_SIDE: f64 = 1e-6;
-/// Gradients are compared relative to their own size, but to no less than this: below it the loss's rounding shows.
+/// Gradients are compared relative to their own size, but to no less than this: below it the loss's
+/// rounding shows.
 const SMALLEST_SCALE: f64 = 1e-3;
 
-/// Compares `gradients` of `loss` with central differences of fourth order, for at most `per_parameter` numbers of each parameter
-/// (spread evenly, the first and last among them).
+/// Compares `gradients` of `loss` with central differences of fourth order, for at most
+/// `per_parameter` numbers of each parameter (spread evenly, the first and last among them).
 ///
-/// The steps of the difference shrink until it agrees with the gradient; if none does, and a one-sided difference does, then
-/// the number sits at a kink and is counted as such. A gradient that is wrong agrees with neither side, kink or not.
-/// `loss` is given the name of the parameter whose gradient is compared: where gradients are stopped, not every parameter's gradient
-/// is that of the same sum. It must be deterministic.
+/// The steps of the difference shrink until it agrees with the gradient; if none does, and a
+/// one-sided difference does, then the number sits at a kink and is counted as such. A gradient
+/// that is wrong agrees with neither side, kink or not. `loss` is given the name of the parameter
+/// whose gradient is compared: where gradients are stopped, not every parameter's gradient is that
+/// of the same sum. It must be deterministic.
 ///
 /// # Errors
 /// What `loss` returns.
@@ -223,7 +226,8 @@ pub(super) mod property {
         }
     }
 
-    /// A case whose inputs have the given shapes, with numbers between -2 and 2 that keep `margin` from 0 (for kinks there).
+    /// A case whose inputs have the given shapes, with numbers between -2 and 2 that keep `margin`
+    /// from 0 (for kinks there).
     pub fn case(
         shapes: &[&[usize]],
         seed: u64,
@@ -252,7 +256,8 @@ pub(super) mod property {
         (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
     }
 
-    /// Runs at least 200 drawn cases (`PROPTEST_CASES` for more), each with its inputs as values and as parameters.
+    /// Runs at least 200 drawn cases (`PROPTEST_CASES` for more), each with its inputs as values
+    /// and as parameters.
     pub fn check(name: &str, cases: BoxedStrategy<Case>) {
         let config = Config::default();
         let mut runner = TestRunner::new(Config {
@@ -335,7 +340,8 @@ pub(super) mod property {
         gradients.iter().map(<[f64]>::to_vec).collect()
     }
 
-    /// Two shapes that broadcast together (numpy's rules), of up to three axes of up to three, zero among them.
+    /// Two shapes that broadcast together (numpy's rules), of up to three axes of up to three, zero
+    /// among them.
     pub fn broadcast_shapes() -> BoxedStrategy<(Vec<usize>, Vec<usize>)> {
         (
             prop::collection::vec(0usize..4, 0..4),

@@ -22,11 +22,12 @@ impl Var {
 
 /// What a recorded operation knows for its way back.
 pub trait Operation<T: Real>: Send {
-    /// Adds to the gradients of the inputs what follows from `dy`, the gradient of the output (in the output's layout).
-    /// `dy` may be overwritten.
+    /// Adds to the gradients of the inputs what follows from `dy`, the gradient of the output (in
+    /// the output's layout). `dy` may be overwritten.
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>);
 
-    /// Gives the operation's own buffers back when its way back is done, or when the tape ends without one.
+    /// Gives the operation's own buffers back when its way back is done, or when the tape ends
+    /// without one.
     fn release(&mut self, _workspace: &mut Workspace<T>) {}
 }
 
@@ -54,8 +55,8 @@ pub(super) struct Lists<T: Real> {
     stagings: Vec<Option<Staging<T>>>,
 }
 
-/// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape ends or
-/// [`Tape::forget_since`].
+/// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape
+/// ends or [`Tape::forget_since`].
 pub struct Tape<'a, T: Real> {
     parameters: &'a Parameters<T>,
     workspace: &'a mut Workspace<T>,
@@ -93,7 +94,8 @@ impl<'a, T: Real> Tape<'a, T> {
         tape
     }
 
-    /// Turns dropout and noise on; all masks and draws follow from this key and the order of the operations.
+    /// Turns dropout and noise on; all masks and draws follow from this key and the order of the
+    /// operations.
     pub fn with_dropout(mut self, key: u64) -> Self {
         self.set_dropout(Some(key));
         self
@@ -104,8 +106,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.dropout_key = key;
     }
 
-    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs, weights among them, that is not
-    /// finite (slow: for finding the cause).
+    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs,
+    /// weights among them, that is not finite (slow: for finding the cause).
     pub fn with_trace(mut self) -> Self {
         self.trace = true;
         self
@@ -115,7 +117,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.recording
     }
 
-    /// A key for the draws of the next operation beside their `strength`, where dropout is on and that above 0.
+    /// A key for the draws of the next operation beside their `strength`, where dropout is on and
+    /// that above 0.
     pub(super) fn next_draws(&self, strength: f64) -> Option<(u64, f64)> {
         let key = self.dropout_key.filter(|_| strength > 0.0);
         key.map(|key| {
@@ -167,7 +170,8 @@ impl<'a, T: Real> Tape<'a, T> {
         Var(self.nodes.len() as u32 - 1)
     }
 
-    /// Builds with all parameters held: gradients go back through what `build` computes of them, but none to the parameters.
+    /// Builds with all parameters held: gradients go back through what `build` computes of them,
+    /// but none to the parameters.
     pub fn frozen<R>(&mut self, build: impl FnOnce(&mut Self) -> R) -> R {
         let before = std::mem::replace(&mut self.frozen, true);
         let result = build(self);
@@ -175,7 +179,8 @@ impl<'a, T: Real> Tape<'a, T> {
         result
     }
 
-    /// A block of a parameter, the same value however often it is asked for; inside [`Tape::frozen`] a constant.
+    /// A block of a parameter, the same value however often it is asked for; inside
+    /// [`Tape::frozen`] a constant.
     pub fn block(&mut self, id: BlockId) -> Var {
         if let Some(var) = self.leaves[id.0].filter(|_| !self.frozen) {
             return var;
@@ -235,7 +240,8 @@ impl<'a, T: Real> Tape<'a, T> {
         }
     }
 
-    /// Puts an operation's output on the tape. `operation` is asked for only where a way back is wanted.
+    /// Puts an operation's output on the tape. `operation` is asked for only where a way back is
+    /// wanted.
     pub(super) fn record<O: Operation<T> + 'static>(
         &mut self,
         name: &'static str,
@@ -280,8 +286,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.nodes.len()
     }
 
-    /// Without recording: drops every value made since `mark` but those in `keep`, which are renamed in place. So a long
-    /// generation needs the memory of one frame.
+    /// Without recording: drops every value made since `mark` but those in `keep`, which are
+    /// renamed in place. So a long generation needs the memory of one frame.
     pub fn forget_since(&mut self, mark: usize, keep: &mut [&mut Var]) {
         if self.recording {
             return;
@@ -341,7 +347,8 @@ impl<'a, T: Real> Tape<'a, T> {
         }
     }
 
-    /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all parameters to `gradients`.
+    /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all
+    /// parameters to `gradients`.
     pub fn backward(self, loss: Var, gradients: &mut Gradients<T>) -> Result<(), AutogradError> {
         if self.values(loss).len() != 1 {
             return Err(AutogradError::Argument {
@@ -355,8 +362,9 @@ impl<'a, T: Real> Tape<'a, T> {
             .map(|_| ())
     }
 
-    /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's layout); adds the gradients
-    /// of the parameters to `gradients` and returns those of `inputs` (values made by [`Tape::input`]).
+    /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's
+    /// layout); adds the gradients of the parameters to `gradients` and returns those of `inputs`
+    /// (values made by [`Tape::input`]).
     pub fn backward_from(
         mut self,
         output: Var,
@@ -590,7 +598,8 @@ pub struct Backward<'s, T: Real> {
     stagings: &'s mut [Option<Staging<T>>],
     gradients: &'s mut Gradients<T>,
     output: Var,
-    /// Whether rows for a weight's gradient are collected; not where each operation's share in it is looked at.
+    /// Whether rows for a weight's gradient are collected; not where each operation's share in it
+    /// is looked at.
     staged: bool,
 }
 
@@ -651,10 +660,11 @@ impl<'s, T: Real> Backward<'s, T> {
         }
     }
 
-    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and x [rows, in].
+    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and x [rows,
+    /// in].
     ///
-    /// Few rows (one time step of a recurrent layer) are collected first, so that a weight used at every time step gets its
-    /// gradient from few large products instead of many thin ones.
+    /// Few rows (one time step of a recurrent layer) are collected first, so that a weight used at
+    /// every time step gets its gradient from few large products instead of many thin ones.
     pub fn weight_gradient(&mut self, weight: Var, dy: Mat<'_, T>, x: Mat<'_, T>) {
         if !self.needs_gradient(weight) || dy.rows == 0 {
             return;

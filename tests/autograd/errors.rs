@@ -194,7 +194,8 @@ fn the_first_gradient_that_is_not_finite_is_traced_to_the_operation_that_made_it
     );
 }
 
-/// A loss whose gradient is finite everywhere but in the product that is the gradient of a weight: 1e30 * 1e30 in f32.
+/// A loss whose gradient is finite everywhere but in the product that is the gradient of a weight:
+/// 1e30 * 1e30 in f32.
 fn backward_of_an_overflow_in_a_weight(
     trace: bool,
     rows: usize,

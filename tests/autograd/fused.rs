@@ -1,4 +1,5 @@
-//! Fused operations are what the plain ones make of the same inputs, values and gradients, in f64 and f32.
+//! Fused operations are what the plain ones make of the same inputs, values and gradients, in f64
+//! and f32.
 
 use std::cell::Cell;
 
@@ -19,7 +20,8 @@ trait Pair {
 
     fn fused<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var]) -> Result<Var>;
 
-    /// Where dropout acts, `masks` is the place on the tape at which its masks are drawn: the same place draws the same masks.
+    /// Where dropout acts, `masks` is the place on the tape at which its masks are drawn: the same
+    /// place draws the same masks.
     fn composed<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -220,7 +222,8 @@ fn lstm_cell_is_its_gates_written_out() {
     agree_in_both(&Lstm, false);
 }
 
-/// Queries in one value, keys and values beside each other in another, a bias of the scores in a third.
+/// Queries in one value, keys and values beside each other in another, a bias of the scores in a
+/// third.
 struct Attention {
     windows: usize,
     heads: usize,

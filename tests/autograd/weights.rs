@@ -39,7 +39,8 @@ fn a_weight_used_at_many_steps_has_the_gradient_of_one_large_product() {
     let (weight, x) = (numbers(7, 5, 0.3), numbers(1500, 5, 1.1));
     let whole = gradient_of_parts(&weight, &x, &[1500]);
     let largest = whole.iter().fold(0f64, |m, g| m.max(g.abs()));
-    // Few rows at a time, more than are collected; just below and just above what is multiplied at once; a mixture.
+    // Few rows at a time, more than are collected; just below and just above what is multiplied at
+    // once; a mixture.
     let mixture = [1, 95, 96, 300, 2, 511, 95, 95, 95, 95, 95, 20];
     for parts in [&[1; 1500][..], &[50; 30], &[95; 15], &[96; 15], &mixture] {
         let rows: usize = parts.iter().sum();

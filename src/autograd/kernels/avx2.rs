@@ -11,7 +11,8 @@ pub static KERNELS: Kernels = Kernels {
     transpose,
 };
 
-/// A tile of `ROWS` rows and the first `VECTORS` times 8 columns of `PANELS` panels; see [`super::blocked::Kernel`].
+/// A tile of `ROWS` rows and the first `VECTORS` times 8 columns of `PANELS` panels; see
+/// [`super::blocked::Kernel`].
 #[target_feature(enable = "avx2,fma")]
 unsafe fn tile<const ROWS: usize, const PANELS: usize, const VECTORS: usize, const DIRECT: bool>(
     t: &Tile,

@@ -29,7 +29,8 @@ pub static KERNELS: Kernels = Kernels {
     transpose: avx2::transpose,
 };
 
-/// A tile of `ROWS` rows and the first `VECTORS` times 16 columns of `PANELS` panels; see [`super::blocked::Kernel`].
+/// A tile of `ROWS` rows and the first `VECTORS` times 16 columns of `PANELS` panels; see
+/// [`super::blocked::Kernel`].
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
 unsafe fn tile<const ROWS: usize, const PANELS: usize, const VECTORS: usize, const DIRECT: bool>(
     t: &Tile,

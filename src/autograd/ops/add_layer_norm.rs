@@ -1,4 +1,5 @@
-//! Residual add, dropout and layer norm in one: what stands behind each sublayer of a Transformer (post-norm).
+//! Residual add, dropout and layer norm in one: what stands behind each sublayer of a Transformer
+//! (post-norm).
 //!
 //! y = layer_norm(residual + dropout(x)); formulas in [`super::layer_norm`].
 

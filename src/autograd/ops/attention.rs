@@ -1,4 +1,5 @@
-//! Multi-head attention over many small windows, as one kernel; also the record of [`super::shared_attention`].
+//! Multi-head attention over many small windows, as one kernel; also the record of
+//! [`super::shared_attention`].
 //!
 //! ```text
 //! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq],
@@ -9,7 +10,8 @@
 //! dQ = scale dS K, dK = scale dS^T Q, dB = sum of dS over windows (and heads).
 //! ```
 //!
-//! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole vectors.
+//! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole
+//! vectors.
 
 use super::attention_core::{Sums, scores, softmax_gradient};
 use super::{argument_error, shapes_error};
@@ -232,13 +234,13 @@ impl<T: Real> Operation<T> for Attention<T> {
 
 impl<T: Real> Tape<'_, T> {
     /// Attention of `shape.queries` tokens to `shape.keys` tokens within each window, as
-    /// `[windows * queries, width]`; `bias [1 or heads, queries, keys]`, the same in every window, is
-    /// added to the scores (negative infinity masks a key, but not all keys of a query); dropout with
-    /// probability `p` on the attention weights.
+    /// `[windows * queries, width]`; `bias [1 or heads, queries, keys]`, the same in every window,
+    /// is added to the scores (negative infinity masks a key, but not all keys of a query); dropout
+    /// with probability `p` on the attention weights.
     ///
     /// # Errors
-    /// Heads that do not divide the width, columns beyond a value, rows that are no whole windows, a bias
-    /// of another shape.
+    /// Heads that do not divide the width, columns beyond a value, rows that are no whole windows,
+    /// a bias of another shape.
     pub fn attention(
         &mut self,
         [q, k, v]: [HeadColumns; 3],
@@ -314,8 +316,8 @@ pub(super) mod gradient {
     use crate::autograd::check::property::{Case, case, strength};
 
     /// Self-attention with Q, K, V in one value, and attention between two values; with and without
-    /// dropout; without a bias and with one for all heads or for each; more keys than a padded chunk;
-    /// small scores and large.
+    /// dropout; without a bias and with one for all heads or for each; more keys than a padded
+    /// chunk; small scores and large.
     pub fn cases() -> BoxedStrategy<Case> {
         let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11);
         let biases = prop_oneof![Just(None), Just(Some(1)), Just(Some(2))];

@@ -1,4 +1,5 @@
-//! What the attentions share: scores in windows and heads, sums of rows weighted with them, and the way back through their softmax.
+//! What the attentions share: scores in windows and heads, sums of rows weighted with them, and the
+//! way back through their softmax.
 
 use super::attention::AttentionShape;
 use crate::autograd::kernels::{
@@ -7,7 +8,8 @@ use crate::autograd::kernels::{
 };
 use crate::autograd::{Backward, Real};
 
-/// out `[windows, heads, queries, padded keys]` = scale a . b, for rows `a` of the queries and `b` of the keys.
+/// out `[windows, heads, queries, padded keys]` = scale a . b, for rows `a` of the queries and `b`
+/// of the keys.
 pub(super) fn scores<T: Real>(
     out: &mut [T],
     (a, b): (WindowRows<'_, T>, WindowRows<'_, T>),
@@ -29,7 +31,8 @@ pub(super) fn scores<T: Real>(
     );
 }
 
-/// Sums of rows: of the keys' rows for each query or, the other way round, of the queries' rows for each key.
+/// Sums of rows: of the keys' rows for each query or, the other way round, of the queries' rows for
+/// each key.
 pub(super) struct Sums<'w, T> {
     /// `[windows, heads, queries, padded keys]`
     pub(super) weights: &'w [T],

@@ -66,8 +66,8 @@ pub(super) fn zip_into<T: Real>(
         .for_each(|o, &x, &y| *o = f(x, y));
 }
 
-/// Adds a gradient of the output's shape, its numbers in row-major order, to that of an operand, summed over the axes along which
-/// the operand was broadcast.
+/// Adds a gradient of the output's shape, its numbers in row-major order, to that of an operand,
+/// summed over the axes along which the operand was broadcast.
 pub(super) fn add_reduced<T: Real>(
     target: Target<'_, T>,
     operand: &[usize],
@@ -100,7 +100,8 @@ pub(super) fn add_reduced<T: Real>(
     }
 }
 
-/// How far apart in an operand neighbours along each axis of `shape` lie: 0 where the operand was broadcast.
+/// How far apart in an operand neighbours along each axis of `shape` lie: 0 where the operand was
+/// broadcast.
 fn broadcast_strides(operand: &[usize], shape: &[usize]) -> Vec<usize> {
     let mut strides = vec![0; shape.len()];
     let mut stride = 1;

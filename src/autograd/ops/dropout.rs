@@ -28,7 +28,8 @@ impl<T: Real> Operation<T> for Dropout {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself where dropout is off.
+    /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself
+    /// where dropout is off.
     pub fn dropout(&mut self, x: Var, p: f64) -> Var {
         let Some((key, p)) = self.next_draws(p) else {
             return x;

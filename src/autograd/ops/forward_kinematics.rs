@@ -1,4 +1,5 @@
-//! Forward kinematics: where the joints of a hierarchy are, from the rotation of each in its parent's frame.
+//! Forward kinematics: where the joints of a hierarchy are, from the rotation of each in its
+//! parent's frame.
 //!
 //! ```text
 //! q [rows, 4 J] quaternions (x, y, z, w), o [bodies, 3 J] offsets in the parent's frame -> p [rows, 3 J]; row r is of body r mod bodies
@@ -76,8 +77,10 @@ impl<T: Real> Operation<T> for ForwardKinematics<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// Positions `[rows, 3 J]` of J joints from unit quaternions (x, y, z, w) `rotations [rows, 4 J]` and `offsets [bodies, 3 J]`, both in
-    /// the parent's frame; `parents` has J entries, a parent before its children. The rows run through the bodies again and again.
+    /// Positions `[rows, 3 J]` of J joints from unit quaternions (x, y, z, w)
+    /// `rotations [rows, 4 J]` and `offsets [bodies, 3 J]`, both in the parent's frame; `parents`
+    /// has J entries, a parent before its children. The rows run through the bodies again and
+    /// again.
     ///
     /// # Errors
     /// Shapes that do not fit; a parent that does not stand before its child.

@@ -79,7 +79,8 @@ impl<T: Real> Operation<T> for Linear {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x W^T + b` for `x [.., in]`, `weight [out, in]`, `bias [out]`, as `[.., out]`; `relu` sets negative numbers to 0.
+    /// `x W^T + b` for `x [.., in]`, `weight [out, in]`, `bias [out]`, as `[.., out]`; `relu` sets
+    /// negative numbers to 0.
     ///
     /// # Errors
     /// Shapes that do not fit.

@@ -1,6 +1,8 @@
-//! Operations on a tape, one file each: formula, shapes, forward, backward and the check of its gradient side by side.
+//! Operations on a tape, one file each: formula, shapes, forward, backward and the check of its
+//! gradient side by side.
 //!
-//! Shapes: `[.., k]` is any number of axes before the last. Gradients are named with a `d` before the value's name.
+//! Shapes: `[.., k]` is any number of axes before the last. Gradients are named with a `d` before
+//! the value's name.
 
 use super::error::AutogradError;
 

@@ -23,8 +23,8 @@ impl<T: Real> Operation<T> for Noise {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's dropout; `x` itself where dropout is
-    /// off.
+    /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's
+    /// dropout; `x` itself where dropout is off.
     pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
         let Some((key, deviation)) = self.next_draws(deviation) else {
             return x;

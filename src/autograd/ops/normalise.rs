@@ -36,8 +36,8 @@ impl<T: Real> Operation<T> for Normalise<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x [.., k width]` with each `width` numbers in a row scaled to a vector of length 1; `eps` (above 0) keeps the gradient finite
-    /// at 0.
+    /// `x [.., k width]` with each `width` numbers in a row scaled to a vector of length 1; `eps`
+    /// (above 0) keeps the gradient finite at 0.
     ///
     /// # Errors
     /// A last axis that is no multiple of `width`.

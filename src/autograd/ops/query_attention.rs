@@ -205,8 +205,9 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// Attention of one query a window, `q [B, d]`, to its `tokens` tokens in `x [B * tokens, d']`, as `[B, d]`; dropout with
-    /// probability `p` on the attention weights. Equal to projecting keys and values and then [`Tape::attention`].
+    /// Attention of one query a window, `q [B, d]`, to its `tokens` tokens in `x [B * tokens, d']`,
+    /// as `[B, d]`; dropout with probability `p` on the attention weights. Equal to projecting keys
+    /// and values and then [`Tape::attention`].
     ///
     /// # Errors
     /// Shapes that do not fit.

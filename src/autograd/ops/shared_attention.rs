@@ -1,20 +1,23 @@
-//! Attention of several heads to keys and values that they share: the tokens themselves (multi-query attention, Shazeer 2019).
+//! Attention of several heads to keys and values that they share: the tokens themselves
+//! (multi-query attention, Shazeer 2019).
 //!
 //! ```text
 //! q [windows * t, heads * c], x [windows * t, c] -> y [windows * t, heads * c]; for each window and head, with q_h [t, c]:
 //! S = scale q_h x^T [t, t], P = softmax(S), D = dropout(P), y_h = D x.
 //! ```
 //!
-//! The heads of a token are so many more queries to the same window: the rest is [`super::attention`] with one head.
+//! The heads of a token are so many more queries to the same window: the rest is
+//! [`super::attention`] with one head.
 
 use super::attention::{Attention, AttentionShape, HeadColumns, Operand};
 use super::shapes_error;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
-    /// Attention of each window's `tokens` tokens to each other, with queries `q [windows * tokens, heads * c]` and the tokens
-    /// `x [windows * tokens, c]` as keys and values of every head, as `[windows * tokens, heads * c]`; scores times `scale`,
-    /// dropout with probability `p` on the attention weights.
+    /// Attention of each window's `tokens` tokens to each other, with queries
+    /// `q [windows * tokens, heads * c]` and the tokens `x [windows * tokens, c]` as keys and
+    /// values of every head, as `[windows * tokens, heads * c]`; scores times `scale`, dropout with
+    /// probability `p` on the attention weights.
     ///
     /// # Errors
     /// Rows that are no whole windows, queries that are not some heads of c columns for each token.
