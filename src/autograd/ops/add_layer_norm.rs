@@ -28,10 +28,10 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// With and without dropout, and with one value as both summands.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (
             0usize..4,
             2usize..9,

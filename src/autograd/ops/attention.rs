@@ -313,12 +313,12 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::{AttentionShape, HeadColumns};
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
     /// Self-attention with Q, K, V in one value, and attention between two values; with and without
     /// dropout; without a bias and with one for all heads or for each; more keys than a padded
     /// chunk; small scores and large.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11);
         let biases = prop_oneof![Just(None), Just(Some(1)), Just(Some(2))];
         (sizes, biases, any::<bool>(), strength(), any::<u64>())

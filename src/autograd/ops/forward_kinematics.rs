@@ -228,10 +228,10 @@ fn rotation_gradient<T: Real>(
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// Trees of drawn parents, two roots among them, on quaternions that need not have length 1.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         let parents = prop::collection::vec(any::<Option<prop::sample::Index>>(), 1..5);
         (parents, 0usize..3, 1usize..3, any::<u64>())
             .prop_map(|(drawn, frames, bodies, seed)| {

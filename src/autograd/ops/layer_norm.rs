@@ -179,9 +179,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (0usize..4, 2usize..9, any::<u64>())
             .prop_map(|(rows, n, seed)| {
                 case(&[&[rows, n], &[n], &[n]], seed, 0.3, |tape, v| {

@@ -156,10 +156,10 @@ fn add_bias<T: Real>(y: &mut [T], bias: Option<&[T]>, outputs: usize, relu: bool
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// The layer is applied twice, so that its weight's gradient adds up.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (
             0usize..4,
             0usize..4,

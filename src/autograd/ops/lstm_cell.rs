@@ -208,11 +208,11 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::LstmWeights;
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
     /// Two steps through time, so that the state's gradient flows back and the weights' adds up;
     /// gates saturated and not.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (0usize..3, 0usize..4, 1usize..3, strength(), any::<u64>())
             .prop_map(|(batch, inputs, n, strength, seed)| {
                 let shapes: [&[usize]; 6] = [

@@ -44,9 +44,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), 0.0..2.0, any::<u64>())
             .prop_map(|(x, deviation, seed)| {
                 case(&[&x], seed, 0.0, move |tape, v| {

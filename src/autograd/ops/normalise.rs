@@ -63,9 +63,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), 1usize..5, any::<u64>())
             .prop_map(|(mut x, width, seed)| {
                 if let Some(last) = x.last_mut() {

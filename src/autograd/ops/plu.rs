@@ -45,11 +45,11 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
     /// The numbers, which keep a margin from 0, are shifted so that the one kink or the other lies
     /// there.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<bool>(), any::<u64>())
             .prop_map(|(x, upper, seed)| {
                 let kink = if upper { super::C } else { -super::C };

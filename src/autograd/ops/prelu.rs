@@ -76,9 +76,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<u64>())
             .prop_map(|(x, seed)| case(&[&x, &[1]], seed, 0.01, |tape, v| tape.prelu(v[0], v[1])))
             .boxed()

@@ -355,10 +355,10 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::QueryAttentionWeights;
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
     /// Two heads that share no weight, with and without dropout; small scores and large.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (
             0usize..3,
             1usize..10,

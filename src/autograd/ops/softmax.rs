@@ -81,9 +81,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes, strength};
+    use crate::autograd::check::property::{Cases, case, shapes, strength};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), strength(), any::<u64>())
             .prop_map(|(x, strength, seed)| {
                 case(&[&x], seed, 0.0, move |tape, v| {
