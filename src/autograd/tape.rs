@@ -1,14 +1,18 @@
-//! The tape: values in the order in which they were made, and the way back through them.
+//! The tape: values in the order in which they were made.
 
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::error::AutogradError;
-use super::kernels::{
-    Mat, MatMut, Real, product, product_at, product_bt, product_packed, vectorised,
-};
-use super::parameters::{BlockId, Gradients, Parameters};
-use super::staging::{DIRECT_ROWS, Staging};
+use super::kernels::Real;
+use super::parameters::{BlockId, Parameters};
+use super::staging::Staging;
 use super::workspace::Workspace;
+
+mod backward;
+mod known;
+
+pub use backward::{Backward, Target};
+use known::Known;
 
 /// A value on a tape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -160,14 +164,7 @@ impl<'a, T: Real> Tape<'a, T> {
         } else {
             value.as_standard_layout().into_owned()
         };
-        self.nodes.push(Node {
-            name,
-            value: Value::Array(value),
-            inputs: Vec::new(),
-            needs_gradient: needs_gradient && self.recording,
-            operation: None,
-        });
-        Var(self.nodes.len() as u32 - 1)
+        self.node(name, Value::Array(value), &[], needs_gradient, None)
     }
 
     /// Builds with all parameters held: gradients go back through what `build` computes of them,
@@ -185,14 +182,8 @@ impl<'a, T: Real> Tape<'a, T> {
         if let Some(var) = self.leaves[id.0].filter(|_| !self.frozen) {
             return var;
         }
-        self.nodes.push(Node {
-            name: "parameter",
-            value: Value::Block(id),
-            inputs: Vec::new(),
-            needs_gradient: self.recording && !self.frozen,
-            operation: None,
-        });
-        let var = Var(self.nodes.len() as u32 - 1);
+        let needs_gradient = !self.frozen;
+        let var = self.node("parameter", Value::Block(id), &[], needs_gradient, None);
         if !self.frozen {
             self.leaves[id.0] = Some(var);
         }
@@ -267,15 +258,24 @@ impl<'a, T: Real> Tape<'a, T> {
         debug_assert_eq!(output.len(), shape.iter().product::<usize>(), "{name}");
         let array = ArrayD::from_shape_vec(IxDyn(shape), output)
             .expect("an operation's output has as many numbers as its shape says");
+        self.node(name, Value::Array(array), inputs, needs_gradient, operation)
+    }
+
+    /// Puts a value on the tape; what only a way back needs is kept where there may be one.
+    fn node(
+        &mut self,
+        name: &'static str,
+        value: Value<T>,
+        inputs: &[Var],
+        needs_gradient: bool,
+        operation: Option<Box<dyn Operation<T>>>,
+    ) -> Var {
+        let inputs = if self.recording { inputs } else { &[] };
         self.nodes.push(Node {
             name,
-            value: Value::Array(array),
-            inputs: if self.recording {
-                inputs.to_vec()
-            } else {
-                Vec::new()
-            },
-            needs_gradient,
+            value,
+            inputs: inputs.to_vec(),
+            needs_gradient: needs_gradient && self.recording,
             operation,
         });
         Var(self.nodes.len() as u32 - 1)
@@ -346,107 +346,6 @@ impl<'a, T: Real> Tape<'a, T> {
                 .collect(),
         }
     }
-
-    /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all
-    /// parameters to `gradients`.
-    pub fn backward(self, loss: Var, gradients: &mut Gradients<T>) -> Result<(), AutogradError> {
-        if self.values(loss).len() != 1 {
-            return Err(AutogradError::Argument {
-                operation: "backward",
-                shape: self.shape(loss).to_vec(),
-                argument: "the loss".into(),
-                expected: "one number",
-            });
-        }
-        self.backward_from(loss, &[T::one()], &[], gradients)
-            .map(|_| ())
-    }
-
-    /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's
-    /// layout); adds the gradients of the parameters to `gradients` and returns those of `inputs`
-    /// (values made by [`Tape::input`]).
-    pub fn backward_from(
-        mut self,
-        output: Var,
-        upstream: &[T],
-        inputs: &[Var],
-        gradients: &mut Gradients<T>,
-    ) -> Result<Vec<ArrayD<T>>, AutogradError> {
-        let lists = self.workspace.lists();
-        let mut slots = std::mem::take(&mut lists.slots);
-        slots.resize_with(self.nodes.len(), || None);
-        let mut stagings = std::mem::take(&mut lists.stagings);
-        stagings.resize_with(self.nodes.len(), || None);
-        if self.needs_gradient(output) {
-            let mut seed = self.workspace.take(upstream.len());
-            seed.copy_from_slice(upstream);
-            slots[output.index()] = Some(seed);
-        }
-        let mut found = Vec::new();
-        for index in (0..self.nodes.len()).rev() {
-            let operation = self.nodes[index].operation.take();
-            let mut context = Backward {
-                known: Known {
-                    nodes: &self.nodes[..=index],
-                    parameters: self.parameters,
-                },
-                workspace: self.workspace,
-                slots: &mut slots,
-                stagings: &mut stagings,
-                gradients,
-                output: Var(index as u32),
-                staged: !self.trace,
-            };
-            context.flush_staging(Var(index as u32));
-            if let Some(mut operation) = operation {
-                if let Some(mut dy) = context.slots[index].take() {
-                    if self.trace
-                        && let Some(what) = not_finite(&dy)
-                    {
-                        return Err(self.non_finite(index, what, "gradient"));
-                    }
-                    operation.backward(&mut dy, &mut context);
-                    if self.trace
-                        && let Some(what) = self.nodes[index].inputs.iter().find_map(|input| {
-                            let gradient = match self.nodes[input.index()].value {
-                                Value::Block(id) => Some(gradients.block(self.parameters, id)),
-                                _ => slots[input.index()].as_deref(),
-                            };
-                            gradient.and_then(not_finite)
-                        })
-                    {
-                        return Err(self.non_finite(index, what, "gradient"));
-                    }
-                    self.workspace.give(dy);
-                }
-                operation.release(self.workspace);
-            }
-            if let Some(k) = inputs.iter().position(|v| v.index() == index) {
-                let shape = self.shape(Var(index as u32)).to_vec();
-                let gradient = slots[index]
-                    .take()
-                    .unwrap_or_else(|| vec![T::zero(); shape.iter().product()]);
-                let array = ArrayD::from_shape_vec(IxDyn(&shape), gradient)
-                    .expect("a gradient has the shape of its value");
-                found.push((k, array));
-            }
-            // Later operations are done and this one too: nothing reads the value any more.
-            if index != output.index()
-                && let Value::Array(array) =
-                    std::mem::replace(&mut self.nodes[index].value, Value::Released)
-            {
-                self.workspace.give(array.into_raw_vec_and_offset().0);
-            }
-        }
-        for unclaimed in slots.drain(..).flatten() {
-            self.workspace.give(unclaimed);
-        }
-        stagings.clear();
-        let lists = self.workspace.lists();
-        (lists.slots, lists.stagings) = (slots, stagings);
-        found.sort_by_key(|(k, _)| *k);
-        Ok(found.into_iter().map(|(_, gradient)| gradient).collect())
-    }
 }
 
 impl<T: Real> Drop for Tape<'_, T> {
@@ -470,226 +369,9 @@ fn release<T: Real>(node: &mut Node<T>, workspace: &mut Workspace<T>) {
     }
 }
 
-/// What is on a tape so far, for reading.
-pub(super) struct Known<'s, T: Real> {
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-}
-
-impl<T: Real> Clone for Known<'_, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T: Real> Copy for Known<'_, T> {}
-
-impl<'s, T: Real> Known<'s, T> {
-    fn shape(self, var: Var) -> &'s [usize] {
-        match &self.nodes[var.index()].value {
-            Value::Array(array) => array.shape(),
-            Value::Block(id) => self.parameters.block_shape(*id),
-            Value::Released => &[],
-        }
-    }
-
-    fn values(self, var: Var) -> &'s [T] {
-        match &self.nodes[var.index()].value {
-            // Every array on the tape is in standard layout.
-            Value::Array(array) => array.as_slice().unwrap_or(&[]),
-            Value::Block(id) => self.parameters.block_values(*id),
-            Value::Released => &[],
-        }
-    }
-
-    fn array(self, var: Var) -> ArrayViewD<'s, T> {
-        ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
-            .expect("a value has as many numbers as its shape says")
-    }
-
-    /// A weight `[out, in]` as a matrix.
-    fn matrix(self, weight: Var) -> Mat<'s, T> {
-        let shape = self.shape(weight);
-        Mat::new(self.values(weight), shape[0], shape[1])
-    }
-
-    /// out (+)= x W for a weight W `[out, in]`, packed where it is a parameter.
-    pub(super) fn product(self, x: Mat<'_, T>, weight: Var, out: MatMut<'_, T>, accumulate: bool) {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => product_packed(x, self.parameters.packed(id), out, accumulate),
-            _ => product(x, self.matrix(weight), out, accumulate),
-        }
-    }
-
-    /// out (+)= x W^T for a weight W `[out, in]`, packed where it is a parameter.
-    pub(super) fn product_transposed(
-        self,
-        x: Mat<'_, T>,
-        weight: Var,
-        out: MatMut<'_, T>,
-        accumulate: bool,
-    ) {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => {
-                product_packed(x, self.parameters.packed_transposed(id), out, accumulate);
-            }
-            _ => product_bt(x, self.matrix(weight), out, accumulate),
-        }
-    }
-}
-
 fn not_finite<T: Real>(values: &[T]) -> Option<&'static str> {
     values
         .iter()
         .find(|x| !x.is_finite())
         .map(|x| if x.is_nan() { "NaN" } else { "infinity" })
-}
-
-/// Where an operation's way back writes the gradient of one input.
-pub struct Target<'t, T> {
-    pub data: &'t mut [T],
-    /// Whether the content is undefined, to be written whole, rather than a sum to be added to.
-    pub fresh: bool,
-}
-
-impl<T: Real> Target<'_, T> {
-    /// Adds `values` to the gradient.
-    pub fn add_values(self, values: &[T]) {
-        if self.fresh {
-            self.data.copy_from_slice(values);
-            return;
-        }
-        vectorised(
-            #[inline(always)]
-            || {
-                for (d, &value) in self.data.iter_mut().zip(values) {
-                    *d += value;
-                }
-            },
-        );
-    }
-
-    /// Adds `gradient(i)` to number i of the gradient, for all i.
-    #[inline(always)]
-    pub fn add(self, gradient: impl Fn(usize) -> T) {
-        let fresh = self.fresh;
-        vectorised(
-            #[inline(always)]
-            || {
-                if fresh {
-                    for (i, d) in self.data.iter_mut().enumerate() {
-                        *d = gradient(i);
-                    }
-                } else {
-                    for (i, d) in self.data.iter_mut().enumerate() {
-                        *d += gradient(i);
-                    }
-                }
-            },
-        );
-    }
-}
-
-/// What an operation sees on the way back: the values before it, and the gradients it adds to.
-pub struct Backward<'s, T: Real> {
-    known: Known<'s, T>,
-    workspace: &'s mut Workspace<T>,
-    slots: &'s mut [Option<Vec<T>>],
-    stagings: &'s mut [Option<Staging<T>>],
-    gradients: &'s mut Gradients<T>,
-    output: Var,
-    /// Whether rows for a weight's gradient are collected; not where each operation's share in it
-    /// is looked at.
-    staged: bool,
-}
-
-impl<'s, T: Real> Backward<'s, T> {
-    /// The numbers of an earlier value in row-major order.
-    pub fn values(&self, var: Var) -> &'s [T] {
-        self.known.values(var)
-    }
-
-    pub fn shape(&self, var: Var) -> &'s [usize] {
-        self.known.shape(var)
-    }
-
-    /// An earlier value as an array.
-    pub fn array(&self, var: Var) -> ArrayViewD<'s, T> {
-        self.known.array(var)
-    }
-
-    /// The operation's own output.
-    pub fn output(&self) -> &'s [T] {
-        self.values(self.output)
-    }
-
-    pub(super) fn known(&self) -> Known<'s, T> {
-        self.known
-    }
-
-    pub fn needs_gradient(&self, var: Var) -> bool {
-        self.known.nodes[var.index()].needs_gradient
-    }
-
-    pub fn take(&mut self, len: usize) -> Vec<T> {
-        self.workspace.take(len)
-    }
-
-    pub fn give(&mut self, buffer: Vec<T>) {
-        self.workspace.give(buffer);
-    }
-
-    /// Where to add the gradient of an input, if it wants one.
-    pub fn target(&mut self, var: Var) -> Option<Target<'_, T>> {
-        let node = &self.known.nodes[var.index()];
-        if !node.needs_gradient {
-            return None;
-        }
-        match &node.value {
-            Value::Block(id) => Some(Target {
-                data: self.gradients.block_mut(self.known.parameters, *id),
-                fresh: false,
-            }),
-            Value::Array(array) => {
-                let slot = &mut self.slots[var.index()];
-                let fresh = slot.is_none();
-                let data = slot.get_or_insert_with(|| self.workspace.take(array.len()));
-                Some(Target { data, fresh })
-            }
-            Value::Released => None,
-        }
-    }
-
-    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and x [rows,
-    /// in].
-    ///
-    /// Few rows (one time step of a recurrent layer) are collected first, so that a weight used at
-    /// every time step gets its gradient from few large products instead of many thin ones.
-    pub fn weight_gradient(&mut self, weight: Var, dy: Mat<'_, T>, x: Mat<'_, T>) {
-        if !self.needs_gradient(weight) || dy.rows == 0 {
-            return;
-        }
-        if dy.rows >= DIRECT_ROWS || !self.staged {
-            if let Some(target) = self.target(weight) {
-                let fresh = target.fresh;
-                product_at(dy, x, MatMut::new(target.data, dy.cols, x.cols), !fresh);
-            }
-            return;
-        }
-        let staging =
-            self.stagings[weight.index()].get_or_insert_with(|| Staging::new(dy.cols, x.cols));
-        staging.push(dy, x, self.workspace);
-        if staging.is_full() {
-            self.flush_staging(weight);
-        }
-    }
-
-    fn flush_staging(&mut self, weight: Var) {
-        if let Some(staging) = self.stagings[weight.index()].take() {
-            if let Some(target) = self.target(weight) {
-                staging.product_into(target.data, !target.fresh);
-            }
-            staging.release(self.workspace);
-        }
-    }
 }
