@@ -98,7 +98,11 @@ mod tests {
     proptest! {
         #[test]
         fn a_rate_rises_over_the_warm_up_then_never_again_and_stays_between_final_share_and_1(
-            shape in prop_oneof![Just(RateShape::Constant), Just(RateShape::Linear), Just(RateShape::Cosine)],
+            shape in prop_oneof![
+                Just(RateShape::Constant),
+                Just(RateShape::Linear),
+                Just(RateShape::Cosine),
+            ],
             warmup_steps in 0u64..50, final_share in 0.0..1.0f64, steps in 1u64..200,
         ) {
             let schedule = RateSchedule { shape, warmup_steps, final_share };

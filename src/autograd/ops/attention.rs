@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq],
-//! k and v rows [windows * tk], each head h has columns h * dh .. (h + 1) * dh; B [1 or heads, tq, tk].
-//! For each window and head:
+//! k and v rows [windows * tk], each head h has columns h * dh .. (h + 1) * dh;
+//! B [1 or heads, tq, tk]. For each window and head:
 //! S = scale Q K^T + B [tq, tk], P = softmax(S), D = dropout(P), Y = D V, scale = 1 / sqrt(dh).
 //! dV = D^T dY, dD = dY V^T, dP = dropout(dD) with the same mask, dS = P (dP - rowsum(dP P)),
 //! dQ = scale dS K, dK = scale dS^T Q, dB = sum of dS over windows (and heads).
@@ -100,11 +100,8 @@ impl<T: Real> Attention<T> {
         scratch: &mut [T],
     ) {
         if let Some(target) = context.target(of.columns.value) {
-            if target.fresh {
-                target.data.fill(T::zero());
-            }
             let place = (of.columns.start, of.stride);
-            sums.put(target.data, place, self.shape, true, scratch);
+            sums.put(target.so_far(), place, self.shape, true, scratch);
         }
     }
 
@@ -120,11 +117,9 @@ impl<T: Real> Attention<T> {
     fn bias_gradient(&self, context: &mut Backward<'_, T>, bias: Var, ds: &[T]) {
         let (keys, padded) = (self.shape.keys, self.shape.padded_keys());
         if let Some(target) = context.target(bias) {
-            if target.fresh {
-                target.data.fill(T::zero());
-            }
-            for ds in ds.chunks_exact(target.data.len() / keys * padded) {
-                let rows = target.data.chunks_exact_mut(keys);
+            let dbias = target.so_far();
+            for ds in ds.chunks_exact(dbias.len() / keys * padded) {
+                let rows = dbias.chunks_exact_mut(keys);
                 for (dbias, ds) in rows.zip(ds.chunks_exact(padded)) {
                     dbias.iter_mut().zip(ds).for_each(|(db, &ds)| *db += ds);
                 }

@@ -74,10 +74,7 @@ pub(super) fn add_reduced<T: Real>(
     shape: &[usize],
     gradient: impl Iterator<Item = T>,
 ) {
-    let data = target.data;
-    if target.fresh {
-        data.fill(T::zero());
-    }
+    let data = target.so_far();
     if operand == shape {
         data.iter_mut().zip(gradient).for_each(|(d, g)| *d += g);
         return;

@@ -1,7 +1,8 @@
 //! Dropout.
 //!
 //! ```text
-//! y = x m / (1 - p), m drawn 0 with probability p, else 1; dX = dY m / (1 - p). The mask is drawn again on the way back.
+//! y = x m / (1 - p), m drawn 0 with probability p, else 1; dX = dY m / (1 - p).
+//! The mask is drawn again on the way back.
 //! ```
 
 use crate::autograd::kernels::dropout_into;

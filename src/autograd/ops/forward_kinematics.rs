@@ -2,11 +2,13 @@
 //! parent's frame.
 //!
 //! ```text
-//! q [rows, 4 J] quaternions (x, y, z, w), o [bodies, 3 J] offsets in the parent's frame -> p [rows, 3 J]; row r is of body r mod bodies
-//! and for joint j with parent k (of a root: k is the world, R the identity, p_k = 0)
-//! p_j = p_k + R(Q_k) o_j, Q_j = Q_k q_j (Hamilton product), R(u, w) v = v + 2 w (u x v) + 2 u x (u x v);
-//! from the last joint to the first, g = dp_j: dp_k += g, do_j = R(Q_k)^T g, dQ_k += the gradient of g . R(Q_k) o_j
-//! and dQ_j conj(q_j), dq_j = conj(Q_k) dQ_j.
+//! q [rows, 4 J] quaternions (x, y, z, w), o [bodies, 3 J] offsets in the parent's frame
+//! -> p [rows, 3 J]; row r is of body r mod bodies and for joint j with parent k
+//! (of a root: k is the world, R the identity, p_k = 0)
+//! p_j = p_k + R(Q_k) o_j, Q_j = Q_k q_j (Hamilton product),
+//! R(u, w) v = v + 2 w (u x v) + 2 u x (u x v);
+//! from the last joint to the first, g = dp_j: dp_k += g, do_j = R(Q_k)^T g,
+//! dQ_k += the gradient of g . R(Q_k) o_j and dQ_j conj(q_j), dq_j = conj(Q_k) dQ_j.
 //! ```
 
 use super::{argument_error, shapes_error};

@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! z = residual + dropout(x), xhat = (z - mean(z)) / sqrt(var(z) + 1e-5), y = xhat gamma + beta;
-//! with g = dY gamma: dZ = (g - mean(g) - xhat mean(g xhat)) / sqrt(var + 1e-5), dgamma = sum dY xhat, dbeta = sum dY,
-//! dresidual = dZ, dX = dropout(dZ) with the same mask. Only mean and 1 / sqrt(var + 1e-5) of each row are kept.
+//! with g = dY gamma: dZ = (g - mean(g) - xhat mean(g xhat)) / sqrt(var + 1e-5),
+//! dgamma = sum dY xhat, dbeta = sum dY, dresidual = dZ, dX = dropout(dZ) with the same mask.
+//! Only mean and 1 / sqrt(var + 1e-5) of each row are kept.
 //! ```
 
 use super::shapes_error;

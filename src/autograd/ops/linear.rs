@@ -24,10 +24,7 @@ pub(super) fn bias_gradient<T: Real>(context: &mut Backward<'_, T>, bias: Var, d
     let Some(target) = context.target(bias) else {
         return;
     };
-    if target.fresh {
-        target.data.fill(T::zero());
-    }
-    let data = target.data;
+    let data = target.so_far();
     if data.is_empty() {
         return;
     }

@@ -1,7 +1,8 @@
 //! One step of an LSTM, its four gates fused.
 //!
 //! ```text
-//! x [B, in], state [B, 2H] = (h | c), W_ih [4H, in], W_hh [4H, H], b_ih, b_hh [4H] -> new state [B, 2H]:
+//! x [B, in], state [B, 2H] = (h | c), W_ih [4H, in], W_hh [4H, H], b_ih, b_hh [4H]
+//! -> new state [B, 2H]:
 //! (i, f, g, o) = x W_ih^T + h W_hh^T + b_ih + b_hh, sigmoid on i, f, o and tanh on g;
 //! c' = f c + i g, h' = o tanh(c').
 //! ```

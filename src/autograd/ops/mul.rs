@@ -1,7 +1,8 @@
 //! Product of two values, element by element.
 //!
 //! ```text
-//! c = a * b, with a and b broadcast to c's shape; dA = dC * b, dB = dC * a, summed over the broadcast axes.
+//! c = a * b, with a and b broadcast to c's shape;
+//! dA = dC * b, dB = dC * a, summed over the broadcast axes.
 //! ```
 
 use super::broadcast::{add_reduced, broadcast_shape, zip_into};

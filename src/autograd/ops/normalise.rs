@@ -1,7 +1,8 @@
 //! Vectors scaled to length 1, such as quaternions.
 //!
 //! ```text
-//! x [.., k width], in vectors of `width` numbers -> y = x / n, n = sqrt(x . x + eps); dX = (dY - y (y . dY)) / n.
+//! x [.., k width], in vectors of `width` numbers -> y = x / n, n = sqrt(x . x + eps);
+//! dX = (dY - y (y . dY)) / n.
 //! ```
 
 use super::argument_error;

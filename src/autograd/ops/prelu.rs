@@ -1,7 +1,8 @@
 //! Parametric rectified linear unit (He et al. 2015) with one learned slope.
 //!
 //! ```text
-//! x [..], slope [1] -> y = x where x > 0, else slope x; dX = dY or slope dY, dslope = sum of dY x where x <= 0.
+//! x [..], slope [1] -> y = x where x > 0, else slope x;
+//! dX = dY or slope dY, dslope = sum of dY x where x <= 0.
 //! ```
 
 use super::shapes_error;

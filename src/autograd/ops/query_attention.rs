@@ -1,13 +1,16 @@
 //! Multi-head attention of one query a window, with the keys' and values' projections inside.
 //!
+//! With a single query the projections of the keys and values need not be made:
+//! q . (W_k x) = (W_k^T q) . x and sum_j p_j W_v x_j = W_v sum_j p_j x_j. (The keys' bias adds the
+//! same number to every score of a window, which the softmax ignores.)
+//!
 //! ```text
-//! With a single query the projections of the keys and values need not be made: q . (W_k x) = (W_k^T q) . x and
-//! sum_j p_j W_v x_j = W_v sum_j p_j x_j. q [B, d] (projected), x [B * n, d'], for each head W_k, W_v [dh, d'], b_v [d]:
+//! q [B, d] (projected), x [B * n, d'], for each head W_k, W_v [dh, d'], b_v [d]:
 //! u = q_h W_k [d'], s_j = u . x_j / sqrt(dh), p = softmax(s), m = dropout(p), z = sum_j m_j x_j,
 //! y_h = W_v z + b_v,h sum_j m_j.
-//! (The keys' bias adds the same number to every score of a window, which the softmax ignores.)
-//! dz = W_v^T dy_h, dm_j = dz . x_j + b_v,h . dy_h, ds by dropout and softmax, du = sum_j ds_j x_j / sqrt(dh),
-//! dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du, dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
+//! dz = W_v^T dy_h, dm_j = dz . x_j + b_v,h . dy_h, ds by dropout and softmax,
+//! du = sum_j ds_j x_j / sqrt(dh), dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du,
+//! dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
 //! ```
 
 use std::ops::Range;
@@ -121,15 +124,13 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
         }
         let bias = context.values(self.weights.value_bias);
         if let Some(target) = context.target(self.weights.value_bias) {
-            if target.fresh {
-                target.data.fill(T::zero());
-            }
+            let db = target.so_far();
             for (row, dy) in dy.chunks_exact(dh).enumerate() {
                 let sum: T = self.m[row * padded..(row + 1) * padded]
                     .iter()
                     .copied()
                     .sum();
-                let db = &mut target.data[sizes.head(row % heads)];
+                let db = &mut db[sizes.head(row % heads)];
                 db.iter_mut().zip(dy).for_each(|(db, &dy)| *db += dy * sum);
             }
         }
@@ -185,10 +186,7 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
             let du_h = Mat::new(&du, batch, heads * width).columns(sizes.tokens_of_head(h));
             context.weight_gradient(weight, q_h, du_h);
             if let Some(target) = context.target(self.q) {
-                if target.fresh {
-                    target.data.fill(T::zero());
-                }
-                let dq = MatMut::new(target.data, batch, all);
+                let dq = MatMut::new(target.so_far(), batch, all);
                 known.product_transposed(du_h, weight, dq.columns(sizes.head(h)), true);
             }
         }

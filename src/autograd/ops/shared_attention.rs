@@ -2,7 +2,8 @@
 //! (multi-query attention, Shazeer 2019).
 //!
 //! ```text
-//! q [windows * t, heads * c], x [windows * t, c] -> y [windows * t, heads * c]; for each window and head, with q_h [t, c]:
+//! q [windows * t, heads * c], x [windows * t, c] -> y [windows * t, heads * c];
+//! for each window and head, with q_h [t, c]:
 //! S = scale q_h x^T [t, t], P = softmax(S), D = dropout(P), y_h = D x.
 //! ```
 //!
