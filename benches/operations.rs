@@ -360,13 +360,6 @@ fn elementwise(c: &mut Criterion) {
     );
     compare(
         group,
-        "relu",
-        one,
-        |tape, v| Ok(tape.relu(v[0])),
-        |x| map(x[0], |x| x.max(0.0)),
-    );
-    compare(
-        group,
         "square",
         one,
         |tape, v| Ok(tape.square(v[0])),

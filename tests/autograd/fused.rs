@@ -146,7 +146,11 @@ impl Pair for Linear {
         if self.bias {
             y = tape.add(y, v[2])?;
         }
-        Ok(if self.relu { tape.relu(y) } else { y })
+        Ok(if self.relu {
+            tape.clamp(y, 0.0, f64::INFINITY)
+        } else {
+            y
+        })
     }
 }
 
@@ -510,7 +514,7 @@ impl Pair for Prelu {
     }
 
     fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
-        let positive = tape.relu(v[0]);
+        let positive = tape.clamp(v[0], 0.0, f64::INFINITY);
         let negative = tape.sub(v[0], positive)?;
         let negative = tape.mul(negative, v[1])?;
         tape.add(positive, negative)

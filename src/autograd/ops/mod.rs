@@ -29,7 +29,6 @@ mod normalise;
 mod plu;
 mod prelu;
 pub mod query_attention;
-mod relu;
 mod reshape;
 mod rows;
 mod shared_attention;
@@ -117,7 +116,6 @@ mod gradient_is_that_of_central_differences {
         plu,
         prelu,
         query_attention,
-        relu,
         reshape,
         rows,
         shared_attention,
