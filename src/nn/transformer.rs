@@ -157,22 +157,6 @@ impl TransformerDecoderLayer {
         self.finish(tape, x, y)
     }
 
-    /// All tokens `x` and the memory, `[windows * tokens, d]`.
-    ///
-    /// # Errors
-    /// Rows that are no whole windows.
-    pub fn forward<T: Real>(
-        &self,
-        tape: &mut Tape<'_, T>,
-        x: Var,
-        memory: Var,
-        tokens: usize,
-    ) -> Result<Var, AutogradError> {
-        let y = self.self_attention.own(tape, x, tokens)?;
-        let memory = self.project_memory(tape, memory)?;
-        self.forward_attended(tape, x, y, memory, tokens)
-    }
-
     /// Token `position` of each window only, `[windows, d]`: all that is asked of a last layer.
     /// `x`, `memory [windows * tokens, d]`.
     ///
