@@ -1,4 +1,5 @@
-//! Generation of transitions by the whole model, in frames a second: batch 1 on one thread, batch 64 on two.
+//! Generation of transitions by the whole model, in frames a second: batch 1 on one thread, batch
+//! 64 on two.
 
 use std::time::Duration;
 

@@ -1,5 +1,6 @@
-//! Each operation's forward pass at the model's shapes (32 windows of 7 tokens, width 256) against the loops that one would write
-//! first, with the standard library's functions. Dropout and noise are random and not compared; dropout is timed with the products.
+//! Each operation's forward pass at the model's shapes (32 windows of 7 tokens, width 256) against
+//! the loops that one would write first, with the standard library's functions. Dropout and noise
+//! are random and not compared; dropout is timed with the products.
 
 use std::hint::black_box;
 
@@ -132,7 +133,8 @@ fn weighted_tokens(q: &[f32], tokens: &[f32]) -> Vec<f32> {
     sum
 }
 
-/// Positions of a chain of joints, each turned by its quaternion (x, y, z, w) in its parent's frame.
+/// Positions of a chain of joints, each turned by its quaternion (x, y, z, w) in its parent's
+/// frame.
 fn chain(rotations: &[f32], offsets: &[f32]) -> Vec<f32> {
     let mut whole = glam::Quat::IDENTITY;
     let mut position = glam::Vec3::ZERO;
@@ -215,7 +217,7 @@ fn layers(c: &mut Criterion) {
                 queries: TOKENS,
                 keys: TOKENS,
             };
-            tape.attention(columns(0), columns(1), columns(2), shape, 0.0)
+            tape.attention([0, 1, 2].map(columns), shape, None, 0.0)
         },
         |x| {
             x[0].chunks_exact(TOKENS * 3 * D)
@@ -355,13 +357,6 @@ fn elementwise(c: &mut Criterion) {
         one,
         |tape, v| Ok(tape.sigmoid(v[0])),
         |x| map(x[0], sigmoid),
-    );
-    compare(
-        group,
-        "relu",
-        one,
-        |tape, v| Ok(tape.relu(v[0])),
-        |x| map(x[0], |x| x.max(0.0)),
     );
     compare(
         group,
@@ -581,7 +576,8 @@ fn movement(c: &mut Criterion) {
     dropout(group);
 }
 
-/// Dropout has no reference to agree with number by number: the naive loop draws each number's fate from a generator.
+/// Dropout has no reference to agree with number by number: the naive loop draws each number's fate
+/// from a generator.
 fn dropout(group: &mut Group<'_>) {
     use rand::{RngExt, SeedableRng};
     let input = random(&[ROWS, D]);

@@ -159,12 +159,6 @@ fn activations(criterion: &mut Criterion) {
             group.bench_function("packed", |bench| {
                 bench.iter(|| product_packed(left, &packed, MatMut::new(&mut c, m, n), false));
             });
-            if Isa::detected() == Isa::Avx512 {
-                let packed = Packed::new_for(Isa::Avx2, Mat::new(&b, k, n));
-                group.bench_function("packed, AVX2", |bench| {
-                    bench.iter(|| product_packed(left, &packed, MatMut::new(&mut c, m, n), false));
-                });
-            }
             group.bench_function("plain", |bench| {
                 let b = Mat::new(&b, k, n);
                 bench.iter(|| product(left, b, MatMut::new(&mut c, m, n), false));
@@ -214,14 +208,13 @@ fn weight_gradients(criterion: &mut Criterion) {
 fn packing(criterion: &mut Criterion) {
     let (k, n) = (512, 1024);
     let b = numbers(k * n);
-    let mut packed = Packed::new(Mat::new(&b, k, n));
     let mut group = short(criterion, "packing 512x1024");
     group.throughput(Throughput::Elements((k * n) as u64));
     group.bench_function("plain", |bench| {
-        bench.iter(|| packed.repack(Mat::new(&b, k, n)))
+        bench.iter(|| Packed::new(Mat::new(&b, k, n)))
     });
     group.bench_function("transposed", |bench| {
-        bench.iter(|| packed.repack_transposed(Mat::new(&b, n, k)));
+        bench.iter(|| Packed::transposed(Mat::new(&b, n, k)));
     });
     group.finish();
 }

@@ -1,5 +1,6 @@
-//! The training step that `keydance train` runs (whole model, batch 128, own predictions fed back, dropout on, two threads), in
-//! frame-steps a second; and two parts of it by themselves, on as many threads: an LSTM with a linear layer, two encoder layers.
+//! The training step that `keydance train` runs (whole model, batch 128, own predictions fed back,
+//! dropout on, two threads), in frame-steps a second; and two parts of it by themselves, on as many
+//! threads: an LSTM with a linear layer, two encoder layers.
 
 use std::time::Duration;
 

@@ -11,7 +11,8 @@ use super::kernels::{Mat, Packed, Real};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ParameterId(pub(super) usize);
 
-/// A range of rows of a parameter (all of them, or a part such as the keys' rows of `in_proj_weight`): what a tape sees of it.
+/// A range of rows of a parameter (all of them, or a part such as the keys' rows of
+/// `in_proj_weight`): what a tape sees of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockId(pub(super) usize);
 
@@ -31,7 +32,8 @@ struct Block<T> {
     /// Numbers of the parameter that the block covers.
     range: Range<usize>,
     shape: Vec<usize>,
-    /// The block as a right operand, W [out, in] and its transpose, packed when first used after an update.
+    /// The block as a right operand, W [out, in] and its transpose, packed when first used after an
+    /// update.
     packed: OnceLock<Packed<T>>,
     packed_transposed: OnceLock<Packed<T>>,
 }

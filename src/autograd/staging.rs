@@ -3,7 +3,8 @@
 use super::kernels::{Mat, MatMut, Real, product_at};
 use super::workspace::Workspace;
 
-/// From this many rows on a product is made at once: its cost then outweighs reading and writing the gradient.
+/// From this many rows on a product is made at once: its cost then outweighs reading and writing
+/// the gradient.
 pub(super) const DIRECT_ROWS: usize = 96;
 /// Collected rows that make a product.
 const FULL_ROWS: usize = 512;

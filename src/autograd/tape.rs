@@ -1,12 +1,18 @@
-//! The tape: values in the order in which they were made, and the way back through them.
+//! The tape: values in the order in which they were made.
 
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::error::AutogradError;
-use super::kernels::{Mat, MatMut, Packed, Real, product_at};
-use super::parameters::{BlockId, BufferId, Gradients, Parameters};
-use super::staging::{DIRECT_ROWS, Staging};
+use super::kernels::Real;
+use super::parameters::{BlockId, BufferId, Parameters};
+use super::staging::Staging;
 use super::workspace::Workspace;
+
+mod backward;
+mod known;
+
+pub use backward::{Backward, Target};
+use known::Known;
 
 /// A value on a tape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -20,11 +26,12 @@ impl Var {
 
 /// What a recorded operation knows for its way back.
 pub trait Operation<T: Real>: Send {
-    /// Adds to the gradients of the inputs what follows from `dy`, the gradient of the output (in the output's layout).
-    /// `dy` may be overwritten.
+    /// Adds to the gradients of the inputs what follows from `dy`, the gradient of the output (in
+    /// the output's layout). `dy` may be overwritten.
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>);
 
-    /// Gives the operation's own buffers back when its way back is done, or when the tape ends without one.
+    /// Gives the operation's own buffers back when its way back is done, or when the tape ends
+    /// without one.
     fn release(&mut self, _workspace: &mut Workspace<T>) {}
 }
 
@@ -52,8 +59,8 @@ pub(super) struct Lists<T: Real> {
     stagings: Vec<Option<Staging<T>>>,
 }
 
-/// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape ends or
-/// [`Tape::forget_since`].
+/// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape
+/// ends or [`Tape::forget_since`].
 pub struct Tape<'a, T: Real> {
     parameters: &'a Parameters<T>,
     workspace: &'a mut Workspace<T>,
@@ -91,7 +98,8 @@ impl<'a, T: Real> Tape<'a, T> {
         tape
     }
 
-    /// Turns dropout and noise on; all masks and draws follow from this key and the order of the operations.
+    /// Turns dropout and noise on; all masks and draws follow from this key and the order of the
+    /// operations.
     pub fn with_dropout(mut self, key: u64) -> Self {
         self.set_dropout(Some(key));
         self
@@ -102,8 +110,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.dropout_key = key;
     }
 
-    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs, weights among them, that is not
-    /// finite (slow: for finding the cause).
+    /// Makes [`Tape::backward`] look for the first operation that makes a gradient of its inputs,
+    /// weights among them, that is not finite (slow: for finding the cause).
     pub fn with_trace(mut self) -> Self {
         self.trace = true;
         self
@@ -113,13 +121,15 @@ impl<'a, T: Real> Tape<'a, T> {
         self.recording
     }
 
-    /// A key for the draws of the next operation, where dropout is on.
-    pub(super) fn next_dropout_key(&self) -> Option<u64> {
-        self.dropout_key.map(|key| {
+    /// A key for the draws of the next operation beside their `strength`, where dropout is on and
+    /// that above 0.
+    pub(super) fn next_draws(&self, strength: f64) -> Option<(u64, f64)> {
+        let key = self.dropout_key.filter(|_| strength > 0.0);
+        key.map(|key| {
             let mut x = key ^ (self.nodes.len() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            x ^ (x >> 31)
+            (x ^ (x >> 31), strength)
         })
     }
 
@@ -154,17 +164,11 @@ impl<'a, T: Real> Tape<'a, T> {
         } else {
             value.as_standard_layout().into_owned()
         };
-        self.nodes.push(Node {
-            name,
-            value: Value::Array(value),
-            inputs: Vec::new(),
-            needs_gradient: needs_gradient && self.recording,
-            operation: None,
-        });
-        Var(self.nodes.len() as u32 - 1)
+        self.node(name, Value::Array(value), &[], needs_gradient, None)
     }
 
-    /// Builds with all parameters held: gradients go back through what `build` computes of them, but none to the parameters.
+    /// Builds with all parameters held: gradients go back through what `build` computes of them,
+    /// but none to the parameters.
     pub fn frozen<R>(&mut self, build: impl FnOnce(&mut Self) -> R) -> R {
         let before = std::mem::replace(&mut self.frozen, true);
         let result = build(self);
@@ -172,19 +176,14 @@ impl<'a, T: Real> Tape<'a, T> {
         result
     }
 
-    /// A block of a parameter, the same value however often it is asked for; inside [`Tape::frozen`] a constant.
+    /// A block of a parameter, the same value however often it is asked for; inside
+    /// [`Tape::frozen`] a constant.
     pub fn block(&mut self, id: BlockId) -> Var {
         if let Some(var) = self.leaves[id.0].filter(|_| !self.frozen) {
             return var;
         }
-        self.nodes.push(Node {
-            name: "parameter",
-            value: Value::Block(id),
-            inputs: Vec::new(),
-            needs_gradient: self.recording && !self.frozen,
-            operation: None,
-        });
-        let var = Var(self.nodes.len() as u32 - 1);
+        let needs_gradient = !self.frozen;
+        let var = self.node("parameter", Value::Block(id), &[], needs_gradient, None);
         if !self.frozen {
             self.leaves[id.0] = Some(var);
         }
@@ -192,17 +191,17 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     pub fn shape(&self, var: Var) -> &[usize] {
-        shape_of(&self.nodes, self.parameters, var)
+        self.known().shape(var)
     }
 
     /// The numbers of a value in row-major order.
     pub fn values(&self, var: Var) -> &[T] {
-        values_of(&self.nodes, self.parameters, var)
+        self.known().values(var)
     }
 
     /// A value as an array.
     pub fn array(&self, var: Var) -> ArrayViewD<'_, T> {
-        array_of(&self.nodes, self.parameters, var)
+        self.known().array(var)
     }
 
     /// Rows and columns of a value seen as a matrix: the last axis, and all before it.
@@ -225,22 +224,15 @@ impl<'a, T: Real> Tape<'a, T> {
         self.workspace.give(buffer);
     }
 
-    /// The packed transpose of a weight W [out, in], where it is a parameter.
-    pub(super) fn packed_transposed(&self, weight: Var) -> Option<&'a Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed_transposed(id)),
-            _ => None,
+    pub(super) fn known(&self) -> Known<'_, T> {
+        Known {
+            nodes: &self.nodes,
+            parameters: self.parameters,
         }
     }
 
-    pub(super) fn packed(&self, weight: Var) -> Option<&'a Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed(id)),
-            _ => None,
-        }
-    }
-
-    /// Puts an operation's output on the tape. `operation` is asked for only where a way back is wanted.
+    /// Puts an operation's output on the tape. `operation` is asked for only where a way back is
+    /// wanted.
     pub(super) fn record<O: Operation<T> + 'static>(
         &mut self,
         name: &'static str,
@@ -266,15 +258,24 @@ impl<'a, T: Real> Tape<'a, T> {
         debug_assert_eq!(output.len(), shape.iter().product::<usize>(), "{name}");
         let array = ArrayD::from_shape_vec(IxDyn(shape), output)
             .expect("an operation's output has as many numbers as its shape says");
+        self.node(name, Value::Array(array), inputs, needs_gradient, operation)
+    }
+
+    /// Puts a value on the tape; what only a way back needs is kept where there may be one.
+    fn node(
+        &mut self,
+        name: &'static str,
+        value: Value<T>,
+        inputs: &[Var],
+        needs_gradient: bool,
+        operation: Option<Box<dyn Operation<T>>>,
+    ) -> Var {
+        let inputs = if self.recording { inputs } else { &[] };
         self.nodes.push(Node {
             name,
-            value: Value::Array(array),
-            inputs: if self.recording {
-                inputs.to_vec()
-            } else {
-                Vec::new()
-            },
-            needs_gradient,
+            value,
+            inputs: inputs.to_vec(),
+            needs_gradient: needs_gradient && self.recording,
             operation,
         });
         Var(self.nodes.len() as u32 - 1)
@@ -285,8 +286,8 @@ impl<'a, T: Real> Tape<'a, T> {
         self.nodes.len()
     }
 
-    /// Without recording: drops every value made since `mark` but those in `keep`, which are renamed in place. So a long
-    /// generation needs the memory of one frame.
+    /// Without recording: drops every value made since `mark` but those in `keep`, which are
+    /// renamed in place. So a long generation needs the memory of one frame.
     pub fn forget_since(&mut self, mark: usize, keep: &mut [&mut Var]) {
         if self.recording {
             return;
@@ -350,113 +351,6 @@ impl<'a, T: Real> Tape<'a, T> {
     pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
         self.parameters.buffer(id)
     }
-
-    /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all parameters to `gradients`.
-    pub fn backward(self, loss: Var, gradients: &mut Gradients<T>) -> Result<(), AutogradError> {
-        if self.values(loss).len() != 1 {
-            return Err(AutogradError::Argument {
-                operation: "backward",
-                shape: self.shape(loss).to_vec(),
-                argument: "the loss".into(),
-                expected: "one number",
-            });
-        }
-        self.backward_from(loss, &[T::one()], &[], gradients)
-            .map(|_| ())
-    }
-
-    /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's layout); adds the gradients
-    /// of the parameters to `gradients` and returns those of `inputs` (values made by [`Tape::input`]).
-    pub fn backward_from(
-        mut self,
-        output: Var,
-        upstream: &[T],
-        inputs: &[Var],
-        gradients: &mut Gradients<T>,
-    ) -> Result<Vec<ArrayD<T>>, AutogradError> {
-        let lists = self.workspace.lists();
-        let mut slots = std::mem::take(&mut lists.slots);
-        slots.resize_with(self.nodes.len(), || None);
-        let mut stagings = std::mem::take(&mut lists.stagings);
-        stagings.resize_with(self.nodes.len(), || None);
-        if self.needs_gradient(output) {
-            let mut seed = self.workspace.take(upstream.len());
-            seed.copy_from_slice(upstream);
-            slots[output.index()] = Some(seed);
-        }
-        let mut found = Vec::new();
-        for index in (0..self.nodes.len()).rev() {
-            let operation = self.nodes[index].operation.take();
-            let mut context = Backward {
-                nodes: &self.nodes[..=index],
-                parameters: self.parameters,
-                workspace: self.workspace,
-                slots: &mut slots,
-                stagings: &mut stagings,
-                gradients,
-                output: Var(index as u32),
-                staged: !self.trace,
-            };
-            context.flush_staging(Var(index as u32));
-            if let Some(mut operation) = operation {
-                if let Some(mut dy) = slots[index].take() {
-                    if self.trace
-                        && let Some(what) = not_finite(&dy)
-                    {
-                        return Err(self.non_finite(index, what, "gradient"));
-                    }
-                    let mut context = Backward {
-                        nodes: &self.nodes[..=index],
-                        parameters: self.parameters,
-                        workspace: self.workspace,
-                        slots: &mut slots,
-                        stagings: &mut stagings,
-                        gradients,
-                        output: Var(index as u32),
-                        staged: !self.trace,
-                    };
-                    operation.backward(&mut dy, &mut context);
-                    if self.trace
-                        && let Some(what) = self.nodes[index].inputs.iter().find_map(|input| {
-                            let gradient = match self.nodes[input.index()].value {
-                                Value::Block(id) => Some(gradients.block(self.parameters, id)),
-                                _ => slots[input.index()].as_deref(),
-                            };
-                            gradient.and_then(not_finite)
-                        })
-                    {
-                        return Err(self.non_finite(index, what, "gradient"));
-                    }
-                    self.workspace.give(dy);
-                }
-                operation.release(self.workspace);
-            }
-            if let Some(k) = inputs.iter().position(|v| v.index() == index) {
-                let shape = self.shape(Var(index as u32)).to_vec();
-                let gradient = slots[index]
-                    .take()
-                    .unwrap_or_else(|| vec![T::zero(); shape.iter().product()]);
-                let array = ArrayD::from_shape_vec(IxDyn(&shape), gradient)
-                    .expect("a gradient has the shape of its value");
-                found.push((k, array));
-            }
-            // Later operations are done and this one too: nothing reads the value any more.
-            if index != output.index()
-                && let Value::Array(array) =
-                    std::mem::replace(&mut self.nodes[index].value, Value::Released)
-            {
-                self.workspace.give(array.into_raw_vec_and_offset().0);
-            }
-        }
-        for unclaimed in slots.drain(..).flatten() {
-            self.workspace.give(unclaimed);
-        }
-        stagings.clear();
-        let lists = self.workspace.lists();
-        (lists.slots, lists.stagings) = (slots, stagings);
-        found.sort_by_key(|(k, _)| *k);
-        Ok(found.into_iter().map(|(_, gradient)| gradient).collect())
-    }
 }
 
 impl<T: Real> Drop for Tape<'_, T> {
@@ -480,203 +374,9 @@ fn release<T: Real>(node: &mut Node<T>, workspace: &mut Workspace<T>) {
     }
 }
 
-fn shape_of<'s, T: Real>(
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    var: Var,
-) -> &'s [usize] {
-    match &nodes[var.index()].value {
-        Value::Array(array) => array.shape(),
-        Value::Block(id) => parameters.block_shape(*id),
-        Value::Released => &[],
-    }
-}
-
-fn values_of<'s, T: Real>(
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    var: Var,
-) -> &'s [T] {
-    match &nodes[var.index()].value {
-        // Every array on the tape is in standard layout.
-        Value::Array(array) => array.as_slice().unwrap_or(&[]),
-        Value::Block(id) => parameters.block_values(*id),
-        Value::Released => &[],
-    }
-}
-
-fn array_of<'s, T: Real>(
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    var: Var,
-) -> ArrayViewD<'s, T> {
-    let shape = IxDyn(shape_of(nodes, parameters, var));
-    ArrayViewD::from_shape(shape, values_of(nodes, parameters, var))
-        .expect("a value has as many numbers as its shape says")
-}
-
 fn not_finite<T: Real>(values: &[T]) -> Option<&'static str> {
     values
         .iter()
         .find(|x| !x.is_finite())
         .map(|x| if x.is_nan() { "NaN" } else { "infinity" })
-}
-
-/// Where an operation's way back writes the gradient of one input.
-pub struct Target<'t, T> {
-    pub data: &'t mut [T],
-    /// Whether the content is undefined, to be written whole, rather than a sum to be added to.
-    pub fresh: bool,
-}
-
-impl<T: Real> Target<'_, T> {
-    /// Adds `values` to the gradient.
-    pub fn add_values(self, values: &[T]) {
-        if self.fresh {
-            self.data.copy_from_slice(values);
-            return;
-        }
-        super::kernels::vectorised(
-            #[inline(always)]
-            || {
-                for (d, &value) in self.data.iter_mut().zip(values) {
-                    *d += value;
-                }
-            },
-        );
-    }
-
-    /// Adds `gradient(i)` to number i of the gradient, for all i.
-    #[inline(always)]
-    pub fn add(self, gradient: impl Fn(usize) -> T) {
-        let fresh = self.fresh;
-        super::kernels::vectorised(
-            #[inline(always)]
-            || {
-                if fresh {
-                    for (i, d) in self.data.iter_mut().enumerate() {
-                        *d = gradient(i);
-                    }
-                } else {
-                    for (i, d) in self.data.iter_mut().enumerate() {
-                        *d += gradient(i);
-                    }
-                }
-            },
-        );
-    }
-}
-
-/// What an operation sees on the way back: the values before it, and the gradients it adds to.
-pub struct Backward<'s, T: Real> {
-    nodes: &'s [Node<T>],
-    parameters: &'s Parameters<T>,
-    workspace: &'s mut Workspace<T>,
-    slots: &'s mut [Option<Vec<T>>],
-    stagings: &'s mut [Option<Staging<T>>],
-    gradients: &'s mut Gradients<T>,
-    output: Var,
-    /// Whether rows for a weight's gradient are collected; not where each operation's share in it is looked at.
-    staged: bool,
-}
-
-impl<'s, T: Real> Backward<'s, T> {
-    /// The numbers of an earlier value in row-major order.
-    pub fn values(&self, var: Var) -> &'s [T] {
-        values_of(self.nodes, self.parameters, var)
-    }
-
-    pub fn shape(&self, var: Var) -> &'s [usize] {
-        shape_of(self.nodes, self.parameters, var)
-    }
-
-    /// An earlier value as an array.
-    pub fn array(&self, var: Var) -> ArrayViewD<'s, T> {
-        array_of(self.nodes, self.parameters, var)
-    }
-
-    /// The operation's own output.
-    pub fn output(&self) -> &'s [T] {
-        self.values(self.output)
-    }
-
-    pub fn needs_gradient(&self, var: Var) -> bool {
-        self.nodes[var.index()].needs_gradient
-    }
-
-    pub fn take(&mut self, len: usize) -> Vec<T> {
-        self.workspace.take(len)
-    }
-
-    pub fn give(&mut self, buffer: Vec<T>) {
-        self.workspace.give(buffer);
-    }
-
-    /// Where to add the gradient of an input, if it wants one.
-    pub fn target(&mut self, var: Var) -> Option<Target<'_, T>> {
-        let node = &self.nodes[var.index()];
-        if !node.needs_gradient {
-            return None;
-        }
-        match &node.value {
-            Value::Block(id) => Some(Target {
-                data: self.gradients.block_mut(self.parameters, *id),
-                fresh: false,
-            }),
-            Value::Array(array) => {
-                let slot = &mut self.slots[var.index()];
-                let fresh = slot.is_none();
-                let data = slot.get_or_insert_with(|| self.workspace.take(array.len()));
-                Some(Target { data, fresh })
-            }
-            Value::Released => None,
-        }
-    }
-
-    /// The weight W [out, in], packed for `dy W`, where it is a parameter.
-    pub fn packed(&self, weight: Var) -> Option<&'s Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed(id)),
-            _ => None,
-        }
-    }
-
-    pub fn packed_transposed(&self, weight: Var) -> Option<&'s Packed<T>> {
-        match self.nodes[weight.index()].value {
-            Value::Block(id) => Some(self.parameters.packed_transposed(id)),
-            _ => None,
-        }
-    }
-
-    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and x [rows, in].
-    ///
-    /// Few rows (one time step of a recurrent layer) are collected first, so that a weight used at every time step gets its
-    /// gradient from few large products instead of many thin ones.
-    pub fn weight_gradient(&mut self, weight: Var, dy: Mat<'_, T>, x: Mat<'_, T>) {
-        if !self.needs_gradient(weight) || dy.rows == 0 {
-            return;
-        }
-        if dy.rows >= DIRECT_ROWS || !self.staged {
-            if let Some(target) = self.target(weight) {
-                let fresh = target.fresh;
-                product_at(dy, x, MatMut::new(target.data, dy.cols, x.cols), !fresh);
-            }
-            return;
-        }
-        let staging =
-            self.stagings[weight.index()].get_or_insert_with(|| Staging::new(dy.cols, x.cols));
-        staging.push(dy, x, self.workspace);
-        if staging.is_full() {
-            self.flush_staging(weight);
-        }
-    }
-
-    fn flush_staging(&mut self, weight: Var) {
-        if let Some(staging) = self.stagings[weight.index()].take() {
-            if let Some(target) = self.target(weight) {
-                staging.product_into(target.data, !target.fresh);
-            }
-            staging.release(self.workspace);
-        }
-    }
 }

@@ -6,10 +6,12 @@ use std::fmt;
 use super::kernels::Real;
 use super::tape::Lists;
 
-/// A pool of buffers by size class, so that after the first steps a training step allocates nothing large.
+/// A pool of buffers by size class, so that after the first steps a training step allocates nothing
+/// large.
 ///
-/// A class spans an eighth of a power of two. A free buffer of up to twice the length asked for will do, too: batches of one number of
-/// windows after the other must not each keep buffers of their own.
+/// A class spans an eighth of a power of two. A free buffer of up to twice the length asked for
+/// will do, too: batches of one number of windows after the other must not each keep buffers of
+/// their own.
 #[derive(Default)]
 pub struct Workspace<T: Real> {
     free: BTreeMap<usize, Vec<Vec<T>>>,
@@ -49,14 +51,8 @@ impl<T: Real> Workspace<T> {
         buffer
     }
 
-    /// A buffer of `len` zeros.
-    pub fn take_zeroed(&mut self, len: usize) -> Vec<T> {
-        let mut buffer = self.take(len);
-        buffer.fill(T::zero());
-        buffer
-    }
-
-    /// Gives a buffer back. One that did not come from here is kept only if its capacity is that of a class.
+    /// Gives a buffer back. One that did not come from here is kept only if its capacity is that of
+    /// a class.
     pub fn give(&mut self, buffer: Vec<T>) {
         let capacity = buffer.capacity();
         if capacity > 0 && class(capacity) == capacity {

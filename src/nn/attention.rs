@@ -1,8 +1,9 @@
 //! Multi-head attention (Vaswani et al. 2017, section 3.2.2).
 //!
-//! Where the tokens are linear in a few numbers, x = E s with s [k] and k far below d, self-attention needs no projections of
-//! its own: with P = [`in_proj`] E, the score of two tokens is s_i^T (P_q,h^T P_k,h) s_j, and the output O sum_j a_ij P_v s_j is
-//! sum_h (O_h P_v,h) (sum_j a_hij s_j). Both matrices in brackets are made once a tape: [`NarrowAttention`].
+//! Where the tokens are linear in a few numbers, x = E s with s [k] and k far below d,
+//! self-attention needs no projections of its own: with P = [`in_proj`] E, the score of two tokens
+//! is s_i^T (P_q,h^T P_k,h) s_j, and the output O sum_j a_ij P_v s_j is sum_h (O_h P_v,h) (sum_j
+//! a_hij s_j). Both matrices in brackets are made once a tape: [`NarrowAttention`].
 //!
 //! [`in_proj`]: MultiHeadAttention::in_projection
 
@@ -16,8 +17,8 @@ use crate::autograd::ops::attention::{AttentionShape, HeadColumns};
 use crate::autograd::ops::query_attention::QueryAttentionWeights;
 use crate::autograd::{AutogradError, BlockId, Real, Tape, Var};
 
-/// Multi-head attention with PyTorch's names: `in_proj_weight [3d, d]` (queries, keys, values; Xavier uniform at first),
-/// `in_proj_bias [3d]` (0), `out_proj` (bias 0).
+/// Multi-head attention with PyTorch's names: `in_proj_weight [3d, d]` (queries, keys, values;
+/// Xavier uniform at first), `in_proj_bias [3d]` (0), `out_proj` (bias 0).
 #[derive(Debug, Clone)]
 pub struct MultiHeadAttention {
     /// All three projections.
@@ -31,7 +32,8 @@ pub struct MultiHeadAttention {
     sizes: TransformerSizes,
 }
 
-/// Self-attention of tokens that are linear in k numbers each, made on a tape by [`MultiHeadAttention::narrow`].
+/// Self-attention of tokens that are linear in k numbers each, made on a tape by
+/// [`MultiHeadAttention::narrow`].
 #[derive(Debug, Clone, Copy)]
 pub struct NarrowAttention {
     /// P_k,h^T P_q,h of each head, `[heads * k, k]`.
@@ -94,7 +96,8 @@ impl MultiHeadAttention {
         }
     }
 
-    /// Attention of the tokens of each window to each other, `[windows * tokens, d]` to the same shape.
+    /// Attention of the tokens of each window to each other, `[windows * tokens, d]` to the same
+    /// shape.
     ///
     /// # Errors
     /// Rows that are no whole windows.
@@ -110,18 +113,14 @@ impl MultiHeadAttention {
             start: k * self.sizes.width,
         };
         let shape = self.shape(tokens, tokens);
-        let y = tape.attention(
-            columns(0),
-            columns(1),
-            columns(2),
-            shape,
-            self.sizes.dropout,
-        )?;
+        let operands = [0, 1, 2].map(columns);
+        let y = tape.attention(operands, shape, None, self.sizes.dropout)?;
         self.output.forward(tape, y)
     }
 
-    /// Self-attention for tokens that are linear in k numbers: `basis [k, d]` are the tokens of the k unit vectors. Every token is
-    /// their sum with weights of which those at `ones` add up to 1; the projections' bias goes there.
+    /// Self-attention for tokens that are linear in k numbers: `basis [k, d]` are the tokens of the
+    /// k unit vectors. Every token is their sum with weights of which those at `ones` add up to 1;
+    /// the projections' bias goes there.
     ///
     /// # Errors
     /// A basis of another width.
@@ -164,7 +163,8 @@ impl MultiHeadAttention {
         })
     }
 
-    /// [`MultiHeadAttention::own`] for the tokens that `narrow` is made for, from their numbers `[windows * tokens, k]`.
+    /// [`MultiHeadAttention::own`] for the tokens that `narrow` is made for, from their numbers
+    /// `[windows * tokens, k]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.
@@ -200,7 +200,8 @@ impl MultiHeadAttention {
         self.keys_and_values.forward(tape, memory)
     }
 
-    /// Attention of `x [windows * tokens, d]` to a memory's keys and values `[windows * tokens, 2d]`, as `[windows * tokens, d]`.
+    /// Attention of `x [windows * tokens, d]` to a memory's keys and values
+    /// `[windows * tokens, 2d]`, as `[windows * tokens, d]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.
@@ -218,12 +219,13 @@ impl MultiHeadAttention {
         };
         let queries = HeadColumns { value, start: 0 };
         let shape = self.shape(tokens, tokens);
-        let y = tape.attention(queries, columns(0), columns(1), shape, self.sizes.dropout)?;
+        let operands = [queries, columns(0), columns(1)];
+        let y = tape.attention(operands, shape, None, self.sizes.dropout)?;
         self.output.forward(tape, y)
     }
 
-    /// Attention of one token a window, `x [windows, d]`, to the window's tokens `[windows * tokens, d]` (not projected), as
-    /// `[windows, d]`.
+    /// Attention of one token a window, `x [windows, d]`, to the window's tokens
+    /// `[windows * tokens, d]` (not projected), as `[windows, d]`.
     ///
     /// # Errors
     /// Rows that do not fit.

@@ -5,7 +5,8 @@ use rand::{Rng, RngExt};
 
 use crate::autograd::{BlockId, BufferId, ParameterId, Parameters, Real};
 
-/// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and memory would end first.
+/// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and
+/// memory would end first.
 pub const MOST_WEIGHTS: usize = 1 << 28;
 
 /// Adds named parameters with initial values drawn from one stream.
@@ -22,7 +23,8 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
         Self::limited(parameters, rng, MOST_WEIGHTS)
     }
 
-    /// For a model of at most `most` weights. What is added beyond is empty: sizes from a file that cannot be trusted take no memory.
+    /// For a model of at most `most` weights. What is added beyond is empty: sizes from a file that
+    /// cannot be trusted take no memory.
     pub fn limited(parameters: &'a mut Parameters<T>, rng: R, most: usize) -> Self {
         Self {
             parameters,

@@ -17,7 +17,8 @@ pub struct Lstm {
 }
 
 impl Lstm {
-    /// Adds `{name}.weight_ih_l0 [4H, in]`, `.weight_hh_l0 [4H, H]`, `.bias_ih_l0`, `.bias_hh_l0 [4H]`.
+    /// Adds `{name}.weight_ih_l0 [4H, in]`, `.weight_hh_l0 [4H, H]`, `.bias_ih_l0`,
+    /// `.bias_hh_l0 [4H]`.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
@@ -41,7 +42,8 @@ impl Lstm {
         tape.constant_with(&[batch, 2 * self.hidden], |state| state.fill(T::zero()))
     }
 
-    /// One step: `x [batch, in]` and the state `[batch, 2H]` give the output `[batch, H]` and the new state.
+    /// One step: `x [batch, in]` and the state `[batch, 2H]` give the output `[batch, H]` and the
+    /// new state.
     ///
     /// # Errors
     /// An input of another width or batch.

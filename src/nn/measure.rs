@@ -1,4 +1,5 @@
-//! How fast two layers of the model are by themselves: forward, a sum of squares, backward, on made-up inputs.
+//! How fast two layers of the model are by themselves: forward, a sum of squares, backward, on
+//! made-up inputs.
 
 use std::time::{Duration, Instant};
 
@@ -21,8 +22,8 @@ const TOKENS: usize = 7;
 pub enum Measured {
     /// An LSTM 1024 -> 256 and a linear layer to 142, on 128 sequences of 30 frames.
     Lstm,
-    /// Two Transformer encoder layers (d 256, 8 heads, feed-forward 256, dropout 0.1) on 128 windows of 7 tokens, with the
-    /// gradient of their input.
+    /// Two Transformer encoder layers (d 256, 8 heads, feed-forward 256, dropout 0.1) on 128
+    /// windows of 7 tokens, with the gradient of their input.
     EncoderLayers,
 }
 

@@ -28,7 +28,8 @@ pub enum LastLayer {
     Zero,
 }
 
-/// Linear, activation, Linear, activation, ..; named as a `torch.nn.Sequential` names them: `{name}.0`, `{name}.1`, ..
+/// Linear, activation, Linear, activation, ..; named as a `torch.nn.Sequential` names them:
+/// `{name}.0`, `{name}.1`, ..
 #[derive(Debug, Clone)]
 pub struct Mlp {
     layers: Vec<(Linear, Step)>,

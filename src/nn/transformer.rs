@@ -1,4 +1,5 @@
-//! Transformer layers (Vaswani et al. 2017): post-norm, ReLU, no mask; dropout on attention weights and sublayer outputs.
+//! Transformer layers (Vaswani et al. 2017): post-norm, ReLU, no mask; dropout on attention weights
+//! and sublayer outputs.
 
 use rand::Rng;
 
@@ -79,7 +80,8 @@ impl TransformerEncoderLayer {
         self.forward_attended(tape, x, y)
     }
 
-    /// [`TransformerEncoderLayer::forward`] where the tokens' attention to each other `y` is there already; both `[rows, d]`.
+    /// [`TransformerEncoderLayer::forward`] where the tokens' attention to each other `y` is there
+    /// already; both `[rows, d]`.
     ///
     /// # Errors
     /// Inputs of other widths.
@@ -106,7 +108,8 @@ pub struct TransformerDecoderLayer {
 }
 
 impl TransformerDecoderLayer {
-    /// Adds `{name}.self_attn`, `.multihead_attn`, `.linear1`, `.linear2`, `.norm1`, `.norm2`, `.norm3`.
+    /// Adds `{name}.self_attn`, `.multihead_attn`, `.linear1`, `.linear2`, `.norm1`, `.norm2`,
+    /// `.norm3`.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
@@ -123,7 +126,8 @@ impl TransformerDecoderLayer {
         }
     }
 
-    /// Keys and values of a memory `[rows, d]` for [`TransformerDecoderLayer::forward_attended`], `[rows, 2d]`.
+    /// Keys and values of a memory `[rows, d]` for [`TransformerDecoderLayer::forward_attended`],
+    /// `[rows, 2d]`.
     ///
     /// # Errors
     /// An input of another width.
@@ -135,8 +139,8 @@ impl TransformerDecoderLayer {
         self.memory_attention.project_memory(tape, memory)
     }
 
-    /// All tokens `x [windows * tokens, d]` with their attention to each other `y`, likewise, and the memory's keys and values
-    /// `[rows, 2d]`.
+    /// All tokens `x [windows * tokens, d]` with their attention to each other `y`, likewise, and
+    /// the memory's keys and values `[rows, 2d]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.
@@ -153,24 +157,8 @@ impl TransformerDecoderLayer {
         self.finish(tape, x, y)
     }
 
-    /// All tokens `x` and the memory, `[windows * tokens, d]`.
-    ///
-    /// # Errors
-    /// Rows that are no whole windows.
-    pub fn forward<T: Real>(
-        &self,
-        tape: &mut Tape<'_, T>,
-        x: Var,
-        memory: Var,
-        tokens: usize,
-    ) -> Result<Var, AutogradError> {
-        let y = self.self_attention.own(tape, x, tokens)?;
-        let memory = self.project_memory(tape, memory)?;
-        self.forward_attended(tape, x, y, memory, tokens)
-    }
-
-    /// Token `position` of each window only, `[windows, d]`: all that is asked of a last layer. `x`, `memory
-    /// [windows * tokens, d]`.
+    /// Token `position` of each window only, `[windows, d]`: all that is asked of a last layer.
+    /// `x`, `memory [windows * tokens, d]`.
     ///
     /// # Errors
     /// Rows that are no whole windows.

@@ -37,7 +37,8 @@ pub struct AdamConfig {
     pub beta2: f64,
     /// Added to the denominator, after the square root.
     pub epsilon: f64,
-    /// Longest gradient over all parameters together; a longer one is scaled down to it. Left out: no limit.
+    /// Longest gradient over all parameters together; a longer one is scaled down to it. Left out:
+    /// no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clip_norm: Option<f64>,
     /// How the rate changes over the training. Left out: not at all.
@@ -159,11 +160,13 @@ impl<T: Real> Adam<T> {
         Ok(())
     }
 
-    /// One step at `learning_rate` with the sum of the shards' gradients, added in their order; leaves every gradient at zero. Returns the norm of
-    /// the sum over all parameters. Runs on rayon's current pool; the result does not depend on its threads.
+    /// One step at `learning_rate` with the sum of the shards' gradients, added in their order;
+    /// leaves every gradient at zero. Returns the norm of the sum over all parameters. Runs on
+    /// rayon's current pool; the result does not depend on its threads.
     ///
     /// # Errors
-    /// A gradient that is not finite; then no weight, no moment is changed, and the gradients are undefined.
+    /// A gradient that is not finite; then no weight, no moment is changed, and the gradients are
+    /// undefined.
     ///
     /// # Panics
     /// When the gradients are of other parameters.
@@ -228,7 +231,8 @@ impl<T: Real> Adam<T> {
     }
 }
 
-/// Adds the gradients of `rest` to `sum` and leaves those at zero. Returns the sum of squares of every parameter.
+/// Adds the gradients of `rest` to `sum` and leaves those at zero. Returns the sum of squares of
+/// every parameter.
 fn add<T: Real>(sum: &mut Gradients<T>, rest: &mut [Gradients<T>]) -> Vec<f64> {
     let mut rest: Vec<_> = rest.iter_mut().map(Gradients::iter_mut).collect();
     let mut chunks = Vec::new();

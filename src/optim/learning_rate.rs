@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How the learning rate falls once it is warmed up; p is the share of the remaining steps that is done, from 0 to below 1.
+/// How the learning rate falls once it is warmed up; p is the share of the remaining steps that is
+/// done, from 0 to below 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RateShape {
@@ -14,9 +15,11 @@ pub enum RateShape {
     Cosine,
 }
 
-/// A learning rate that changes: up from zero over `warmup_steps`, then from the whole rate towards `final_share` of it.
+/// A learning rate that changes: up from zero over `warmup_steps`, then from the whole rate towards
+/// `final_share` of it.
 ///
-/// It depends on the step and on the number of steps of the trained share of the schedule only, so a resumed training has the same.
+/// It depends on the step and on the number of steps of the trained share of the schedule only, so
+/// a resumed training has the same.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RateSchedule {
@@ -95,7 +98,11 @@ mod tests {
     proptest! {
         #[test]
         fn a_rate_rises_over_the_warm_up_then_never_again_and_stays_between_final_share_and_1(
-            shape in prop_oneof![Just(RateShape::Constant), Just(RateShape::Linear), Just(RateShape::Cosine)],
+            shape in prop_oneof![
+                Just(RateShape::Constant),
+                Just(RateShape::Linear),
+                Just(RateShape::Cosine),
+            ],
             warmup_steps in 0u64..50, final_share in 0.0..1.0f64, steps in 1u64..200,
         ) {
             let schedule = RateSchedule { shape, warmup_steps, final_share };

@@ -1,4 +1,5 @@
-//! The check catches what it is there for: operations with a mistake in their way back fail it, the same ones without it pass.
+//! The check catches what it is there for: operations with a mistake in their way back fail it, the
+//! same ones without it pass.
 
 use ndarray::{ArrayD, Dimension as _, IxDyn, arr1};
 

@@ -2,22 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::blocked::{Kernels, LEFT_STEP, Rows, Tile};
-
-/// Kernels for a number of rows, with the panels of the wide one.
-macro_rules! rows {
-    ($($rows:literal * $panels:literal),*) => {
-        &[$(Rows {
-            panels: $panels,
-            wide: tile::<$rows, $panels, 2, false>,
-            single: tile::<$rows, 1, 2, false>,
-            half: tile::<$rows, 1, 1, false>,
-            wide_direct: tile::<$rows, $panels, 2, true>,
-            single_direct: tile::<$rows, 1, 2, true>,
-            half_direct: tile::<$rows, 1, 1, true>,
-        }),*]
-    };
-}
+use super::blocked::{Kernels, LEFT_STEP, Rows, Tile, rows};
 
 /// The kernels of AVX2.
 pub static KERNELS: Kernels = Kernels {
@@ -26,7 +11,8 @@ pub static KERNELS: Kernels = Kernels {
     transpose,
 };
 
-/// A tile of `ROWS` rows and the first `VECTORS` times 8 columns of `PANELS` panels; see [`super::blocked::Kernel`].
+/// A tile of `ROWS` rows and the first `VECTORS` times 8 columns of `PANELS` panels; see
+/// [`super::blocked::Kernel`].
 #[target_feature(enable = "avx2,fma")]
 unsafe fn tile<const ROWS: usize, const PANELS: usize, const VECTORS: usize, const DIRECT: bool>(
     t: &Tile,

@@ -4,23 +4,8 @@ use std::arch::x86_64::*;
 
 use super::{
     avx2,
-    blocked::{Kernels, LEFT_STEP, Rows, Tile},
+    blocked::{Kernels, LEFT_STEP, Rows, Tile, rows},
 };
-
-/// Kernels for a number of rows, with the panels of the wide one.
-macro_rules! rows {
-    ($($rows:literal * $panels:literal),*) => {
-        &[$(Rows {
-            panels: $panels,
-            wide: tile::<$rows, $panels, 2, false>,
-            single: tile::<$rows, 1, 2, false>,
-            half: tile::<$rows, 1, 1, false>,
-            wide_direct: tile::<$rows, $panels, 2, true>,
-            single_direct: tile::<$rows, 1, 2, true>,
-            half_direct: tile::<$rows, 1, 1, true>,
-        }),*]
-    };
-}
 
 /// The kernels of AVX-512.
 pub static KERNELS: Kernels = Kernels {
@@ -44,7 +29,8 @@ pub static KERNELS: Kernels = Kernels {
     transpose: avx2::transpose,
 };
 
-/// A tile of `ROWS` rows and the first `VECTORS` times 16 columns of `PANELS` panels; see [`super::blocked::Kernel`].
+/// A tile of `ROWS` rows and the first `VECTORS` times 16 columns of `PANELS` panels; see
+/// [`super::blocked::Kernel`].
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
 unsafe fn tile<const ROWS: usize, const PANELS: usize, const VECTORS: usize, const DIRECT: bool>(
     t: &Tile,

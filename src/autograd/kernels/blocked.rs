@@ -21,9 +21,9 @@ const SOME_ROWS: usize = 28;
 
 /// One product of rows of A and columns of B, the work of a kernel.
 ///
-/// Element `(i, p)` of A is at `a[i * a_row + p]` for direct kernels and at `a[i + p * LEFT_STEP]` for
-/// the others, element `(p, j)` of panel q of B at
-/// `b[q * b_panel + p * b_step + j]`, element `(i, j)` of C at `c[i * c_row + j]`.
+/// Element `(i, p)` of A is at `a[i * a_row + p]` for direct kernels and at `a[i + p * LEFT_STEP]`
+/// for the others, element `(p, j)` of panel q of B at `b[q * b_panel + p * b_step + j]`, element
+/// `(i, j)` of C at `c[i * c_row + j]`.
 #[derive(Clone, Copy)]
 pub struct Tile {
     pub k: usize,
@@ -62,6 +62,23 @@ pub struct Rows {
     /// `half` for A where it is.
     pub half_direct: Kernel,
 }
+
+/// [`Rows`] of an instruction set's `tile`s: numbers of rows, each times the panels of the wide
+/// one.
+macro_rules! rows {
+    ($($rows:literal * $panels:literal),*) => {
+        &[$(Rows {
+            panels: $panels,
+            wide: tile::<$rows, $panels, 2, false>,
+            single: tile::<$rows, 1, 2, false>,
+            half: tile::<$rows, 1, 1, false>,
+            wide_direct: tile::<$rows, $panels, 2, true>,
+            single_direct: tile::<$rows, 1, 2, true>,
+            half_direct: tile::<$rows, 1, 1, true>,
+        }),*]
+    };
+}
+pub(super) use rows;
 
 /// The kernels of an instruction set.
 pub struct Kernels {

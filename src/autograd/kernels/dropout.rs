@@ -6,8 +6,7 @@ use super::{Real, vectorised};
 ///
 /// An element is kept with probability 1 - p, p rounded to a multiple of 2^-16. The same bits on
 /// every CPU.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dropout {
+pub(super) struct Dropout {
     first: u32,
     second: u32,
     threshold: u32,
@@ -16,7 +15,7 @@ pub struct Dropout {
 
 impl Dropout {
     /// The mask of stream `key` that drops with probability `p` in 0 to 1.
-    pub fn new(key: u64, p: f64) -> Self {
+    pub(super) fn new(key: u64, p: f64) -> Self {
         // SplitMix64's output function, so that neighbouring keys give unrelated masks.
         let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -32,26 +31,16 @@ impl Dropout {
 
     /// Whether element `index` is kept.
     #[inline(always)]
-    pub fn keep(&self, index: u32) -> bool {
+    pub(super) fn keep(&self, index: u32) -> bool {
         // The hash "lowbias32" with the key's halves mixed in.
         let mut h = index ^ self.first;
         h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d) ^ self.second;
         h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
         (h >> 16) >= self.threshold
     }
-
-    /// What element `index` is multiplied with: 1 / (1 - p) or 0.
-    #[inline(always)]
-    pub fn factor<T: Real>(&self, index: u32) -> T {
-        if self.keep(index) {
-            T::from_f64(self.scale)
-        } else {
-            T::zero()
-        }
-    }
 }
 
-/// `out[i] = x[i] * mask[i] / (1 - p)` with the mask of stream `key` (see [`Dropout`]).
+/// `out[i] = x[i] * mask[i] / (1 - p)` with the mask of stream `key` (as [`Dropout`] makes it).
 ///
 /// # Panics
 /// When the lengths differ or exceed 2^32.
@@ -81,4 +70,16 @@ pub fn dropout_into<T: Real>(key: u64, p: f64, x: &[T], out: &mut [T]) {
             }
         },
     );
+}
+
+/// [`dropout_into`] with a stream's key and probability, or a copy where there is no dropout.
+///
+/// # Panics
+/// As [`dropout_into`].
+#[track_caller]
+pub fn dropped_into<T: Real>(dropout: Option<(u64, f64)>, x: &[T], out: &mut [T]) {
+    match dropout {
+        Some((key, p)) => dropout_into(key, p, x, out),
+        None => out.copy_from_slice(x),
+    }
 }

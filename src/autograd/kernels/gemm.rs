@@ -1,6 +1,6 @@
 //! What the number types do differently in a product.
 
-use super::{Isa, MatMut, blocked, buffer::Buffer, matrix::Operand};
+use super::{Isa, Mat, MatMut, blocked, buffer::Buffer, matrix::Operand};
 
 /// The products of one number type. Shapes have been checked by the callers in `product`.
 ///
@@ -82,7 +82,7 @@ impl Gemm for f32 {
         match isa.kernels() {
             Some(kernels) => blocked::product_packed(kernels, a, b, c, accumulate),
             None => {
-                let b = Operand::rows_of(b, a.cols(), c.cols);
+                let b = Operand::new(Mat::new(b, a.cols(), c.cols));
                 multiply_single(a, b, c, accumulate);
             }
         }
@@ -102,7 +102,7 @@ impl Gemm for f64 {
     }
 
     fn product_packed(_: Isa, a: Operand<Self>, b: &[Self], c: MatMut<Self>, accumulate: bool) {
-        let b = Operand::rows_of(b, a.cols(), c.cols);
+        let b = Operand::new(Mat::new(b, a.cols(), c.cols));
         multiply_double(a, b, c, accumulate);
     }
 

@@ -34,7 +34,8 @@ impl Isa {
     /// Every set, best first.
     pub const ALL: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
 
-    /// The set that `KEYDANCE_ISA` asks for (to get the numbers of another machine), else the best set this CPU has.
+    /// The set that `KEYDANCE_ISA` asks for (to get the numbers of another machine), else the best
+    /// set this CPU has.
     #[inline]
     pub fn detected() -> Self {
         static DETECTED: OnceLock<Isa> = OnceLock::new();

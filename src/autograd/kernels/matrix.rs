@@ -1,5 +1,7 @@
 //! Row-major matrices that are views into slices.
 
+use std::ops::Range;
+
 /// A matrix to read: row-major, columns adjacent.
 #[derive(Clone, Copy, Debug)]
 pub struct Mat<'a, T> {
@@ -73,6 +75,21 @@ impl<'a, T> Mat<'a, T> {
         }
     }
 
+    /// A range of the columns.
+    ///
+    /// # Panics
+    /// When the range goes beyond the columns.
+    #[inline]
+    #[track_caller]
+    pub fn columns(self, range: Range<usize>) -> Self {
+        assert!(range.end <= self.cols, "columns {range:?} of {}", self.cols);
+        Self {
+            data: self.data.get(range.start..).unwrap_or_default(),
+            cols: range.len(),
+            ..self
+        }
+    }
+
     /// Checks the shape again: the fields are open, and kernels rely on it.
     #[inline]
     #[track_caller]
@@ -106,6 +123,21 @@ impl<'a, T> MatMut<'a, T> {
             rows,
             cols,
             stride,
+        }
+    }
+
+    /// A range of the columns.
+    ///
+    /// # Panics
+    /// When the range goes beyond the columns.
+    #[inline]
+    #[track_caller]
+    pub fn columns(self, range: Range<usize>) -> Self {
+        assert!(range.end <= self.cols, "columns {range:?} of {}", self.cols);
+        Self {
+            data: self.data.get_mut(range.start..).unwrap_or_default(),
+            cols: range.len(),
+            ..self
         }
     }
 
@@ -145,16 +177,6 @@ impl<'a, T> Operand<'a, T> {
         Self {
             matrix: matrix.checked(),
             transposed: true,
-        }
-    }
-
-    /// `rows` rows of `cols` numbers without gaps.
-    #[inline]
-    #[track_caller]
-    pub fn rows_of(data: &'a [T], rows: usize, cols: usize) -> Self {
-        Self {
-            matrix: Mat::new(data, rows, cols),
-            transposed: false,
         }
     }
 

@@ -1,11 +1,12 @@
-//! The arithmetic under the engine: matrix products, those of attention's small windows, vectorised exponentials, dropout masks.
+//! The arithmetic under the engine: matrix products, those of attention's small windows, vectorised
+//! exponentials, dropout masks.
 //!
 //! The only place of the crate with `unsafe` code. Everything public here is safe: operands are
 //! slices with a shape, and a shape that does not fit its slice or its partners panics.
 //!
-//! An instruction set is chosen once, at run time ([`Isa`]); `KEYDANCE_ISA` in the environment overrules the choice. f32 products have kernels of their own
-//! for AVX-512 and for AVX2 with FMA; f64 products, and f32 products on other CPUs, go to
-//! `matrixmultiply`.
+//! An instruction set is chosen once, at run time ([`Isa`]); `KEYDANCE_ISA` in the environment
+//! overrules the choice. f32 products have kernels of their own for AVX-512 and for AVX2 with FMA;
+//! f64 products, and f32 products on other CPUs, go to `matrixmultiply`.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -27,7 +28,7 @@ mod windows;
 #[cfg(test)]
 mod tests;
 
-pub use dropout::{Dropout, dropout_into};
+pub use dropout::{dropout_into, dropped_into};
 pub use isa::{Isa, IsaError, vectorised};
 pub use matrix::{Mat, MatMut};
 pub use packed::Packed;

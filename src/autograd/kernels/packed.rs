@@ -17,7 +17,7 @@ pub struct Packed<T> {
 impl<T: Real> Packed<T> {
     /// B `[k, n]`.
     pub fn new(b: Mat<T>) -> Self {
-        Self::new_for(Isa::detected(), b)
+        Self::new_on(Isa::detected(), Operand::new(b))
     }
 
     /// B^T `[k, n]` from b `[n, k]`.
@@ -25,43 +25,23 @@ impl<T: Real> Packed<T> {
         Self::new_on(Isa::detected(), Operand::transpose(b))
     }
 
-    /// B `[k, n]` for the kernels of one instruction set, to compare them.
-    ///
-    /// # Panics
-    /// When this CPU lacks the set.
-    pub fn new_for(isa: Isa, b: Mat<T>) -> Self {
-        Self::new_on(isa, Operand::new(b))
+    pub(super) fn new_on(isa: Isa, b: Operand<T>) -> Self {
+        let mut buffer = Buffer::new();
+        T::pack(isa, b, &mut buffer);
+        Self {
+            isa,
+            buffer,
+            rows: b.rows(),
+            cols: b.cols(),
+        }
     }
 
-    /// Replaces the operand by B `[k, n]`; the memory is used again.
-    pub fn repack(&mut self, b: Mat<T>) {
-        self.pack(Operand::new(b));
-    }
-
-    /// Replaces the operand by B^T `[k, n]` from b `[n, k]`; the memory is used again.
-    pub fn repack_transposed(&mut self, b: Mat<T>) {
-        self.pack(Operand::transpose(b));
-    }
-
-    /// k, the number of rows.
-    pub fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.rows
     }
 
-    /// n, the number of columns.
-    pub fn cols(&self) -> usize {
+    pub(super) fn cols(&self) -> usize {
         self.cols
-    }
-
-    pub(super) fn new_on(isa: Isa, b: Operand<T>) -> Self {
-        let mut packed = Self {
-            isa,
-            buffer: Buffer::new(),
-            rows: 0,
-            cols: 0,
-        };
-        packed.pack(b);
-        packed
     }
 
     pub(super) fn isa(&self) -> Isa {
@@ -70,10 +50,5 @@ impl<T: Real> Packed<T> {
 
     pub(super) fn data(&self) -> &[T] {
         self.buffer.as_slice()
-    }
-
-    fn pack(&mut self, b: Operand<T>) {
-        (self.rows, self.cols) = (b.rows(), b.cols());
-        T::pack(self.isa, b, &mut self.buffer);
     }
 }

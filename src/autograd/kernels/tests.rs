@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{matrix::Operand, product::product_on, *};
+use super::{dropout::Dropout, matrix::Operand, product::product_on, *};
 
 /// The sets that this machine can run.
 fn sets() -> Vec<Isa> {
@@ -294,29 +294,6 @@ fn an_empty_sum_clears_or_keeps() {
 }
 
 #[test]
-fn a_repacked_operand_is_the_new_one() {
-    let (old, new) = (matrix::<f32>(40, 70, 70, 1), matrix::<f32>(9, 20, 20, 2));
-    let mut packed = Packed::new(Mat::new(&old, 40, 70));
-    let a = matrix::<f32>(3, 20, 20, 3);
-    let (mut c, mut expected) = (vec![0.0; 27], vec![0.0; 27]);
-    packed.repack_transposed(Mat::new(&new, 9, 20));
-    assert_eq!((packed.rows(), packed.cols()), (20, 9));
-    product_packed(
-        Mat::new(&a, 3, 20),
-        &packed,
-        MatMut::new(&mut c, 3, 9),
-        false,
-    );
-    product_bt(
-        Mat::new(&a, 3, 20),
-        Mat::new(&new, 9, 20),
-        MatMut::new(&mut expected, 3, 9),
-        false,
-    );
-    assert_eq!(c, expected);
-}
-
-#[test]
 #[should_panic(expected = "does not give")]
 fn shapes_that_do_not_fit_panic() {
     let (a, b, mut c) = (vec![0.0f32; 6], vec![0.0; 6], vec![0.0; 4]);
@@ -458,7 +435,6 @@ fn dropout_masks_are_reproducible_and_unrelated_between_keys() {
     let mut out = vec![0.0; x.len()];
     dropout_into(2, 0.5, &x, &mut out);
     for (i, (x, y)) in x.iter().zip(&out).enumerate() {
-        assert_eq!(*y, x * Dropout::new(2, 0.5).factor::<f64>(i as u32));
-        assert_eq!(masks[2][i] || i == 0, *y != 0.0 || i == 0);
+        assert_eq!(*y, if masks[2][i] { 2.0 * x } else { 0.0 });
     }
 }

@@ -1,7 +1,9 @@
-//! What attention does inside one small window: products of a few rows, and the softmax of their scores.
+//! What attention does inside one small window: products of a few rows, and the softmax of their
+//! scores.
 //!
-//! A window has so few tokens that a general product would spend its time on packing. Here [`ROWS`] rows are done at once, their sums
-//! in registers, so that the sums do not wait for each other. Rows of scores are padded to a multiple of [`CHUNK`] numbers.
+//! A window has so few tokens that a general product would spend its time on packing. Here [`ROWS`]
+//! rows are done at once, their sums in registers, so that the sums do not wait for each other.
+//! Rows of scores are padded to a multiple of [`CHUNK`] numbers.
 
 use super::Real;
 
@@ -42,7 +44,8 @@ pub fn scratch_len(rows: usize, width: usize) -> usize {
     rows.next_multiple_of(CHUNK) * width.next_multiple_of(LANES)
 }
 
-/// out[i, j] = scale * a_i . b_j, i below `rows`, j below `keys`, `out [rows, padded keys]`; the padding gets 0.
+/// out[i, j] = scale * a_i . b_j, i below `rows`, j below `keys`, `out [rows, padded keys]`; the
+/// padding gets 0.
 #[inline(always)]
 pub fn window_scores<T: Real>(
     out: &mut [T],
@@ -104,7 +107,8 @@ pub struct WindowWeights<'w, T> {
     pub row: usize,
 }
 
-/// out_i (+)= sum_j weight(i, j) x_j, i below `results`, j below `rows`; rows of `out` begin `stride` apart.
+/// out_i (+)= sum_j weight(i, j) x_j, i below `results`, j below `rows`; rows of `out` begin
+/// `stride` apart.
 #[inline(always)]
 pub fn window_sums<T: Real>(
     (out, stride, results): (&mut [T], usize, usize),
@@ -145,7 +149,8 @@ pub fn window_sums<T: Real>(
                     copy(&mut edge[..n], &out[(first + r) * stride + column..][..n]);
                 }
             }
-            // Sums of their own, as the compiler keeps no array in registers that is cut at a place it does not know.
+            // Sums of their own, as the compiler keeps no array in registers that is cut at a place
+            // it does not know.
             let mut sums = edges;
             for j in 0..rows {
                 let x = &x.row(j, wide)[column..column + LANES];

@@ -1,4 +1,5 @@
-//! Residual add, dropout and layer norm in one: what stands behind each sublayer of a Transformer (post-norm).
+//! Residual add, dropout and layer norm in one: what stands behind each sublayer of a Transformer
+//! (post-norm).
 //!
 //! y = layer_norm(residual + dropout(x)); formulas in [`super::layer_norm`].
 
@@ -17,10 +18,7 @@ impl<T: Real> Tape<'_, T> {
         (gamma, beta): (Var, Var),
         p: f64,
     ) -> Result<Var, AutogradError> {
-        let dropout = self
-            .next_dropout_key()
-            .filter(|_| p > 0.0)
-            .map(|key| (key, p));
+        let dropout = self.next_draws(p);
         let name = "add_layer_norm";
         layer_norm(self, name, x, Some(residual), (gamma, beta), dropout)
     }
@@ -30,11 +28,17 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// With and without dropout, and with one value as both summands.
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 2usize..9, any::<bool>(), any::<bool>(), any::<u64>())
+    pub fn cases() -> Cases {
+        (
+            0usize..4,
+            2usize..9,
+            any::<bool>(),
+            any::<bool>(),
+            any::<u64>(),
+        )
             .prop_map(|(rows, n, dropout, same, seed)| {
                 let shapes: [&[usize]; 4] = [&[rows, n], &[rows, n], &[n], &[n]];
                 case(&shapes, seed, 0.3, move |tape, v| {

@@ -25,9 +25,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), -3.0..3.0, -3.0..3.0, any::<u64>())
             .prop_map(|(x, scale, shift, seed)| {
                 case(&[&x], seed, 0.0, move |tape, v| {

@@ -1,19 +1,22 @@
-//! Multi-head attention over many small windows, as one kernel, and the core it shares with [`super::shared_attention`].
+//! Multi-head attention over many small windows, as one kernel; also the record of
+//! [`super::shared_attention`].
 //!
 //! ```text
-//! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq], k and v rows [windows * tk], each head h
-//! has columns h * dh .. (h + 1) * dh. For each window and head:
-//! S = scale Q K^T [tq, tk], P = softmax(S), D = dropout(P), Y = D V, scale = 1 / sqrt(dh).
+//! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq],
+//! k and v rows [windows * tk], each head h has columns h * dh .. (h + 1) * dh;
+//! B [1 or heads, tq, tk]. For each window and head:
+//! S = scale Q K^T + B [tq, tk], P = softmax(S), D = dropout(P), Y = D V, scale = 1 / sqrt(dh).
 //! dV = D^T dY, dD = dY V^T, dP = dropout(dD) with the same mask, dS = P (dP - rowsum(dP P)),
-//! dQ = scale dS K, dK = scale dS^T Q.
+//! dQ = scale dS K, dK = scale dS^T Q, dB = sum of dS over windows (and heads).
 //! ```
 //!
-//! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole vectors.
+//! Rows of S, P, D are padded to a multiple of 8 numbers, so that the loops over tk are whole
+//! vectors.
 
+use super::attention_core::{Sums, scores, softmax_gradient};
 use super::{argument_error, shapes_error};
 use crate::autograd::kernels::{
-    CHUNK, WindowRows, WindowWeights, dropout_into, scratch_len, vectorised, window_scores,
-    window_softmax, window_softmax_backward, window_sums,
+    CHUNK, WindowRows, dropout_into, dropped_into, scratch_len, vectorised, window_softmax,
 };
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
@@ -38,12 +41,21 @@ pub struct AttentionShape {
 }
 
 impl AttentionShape {
-    fn head_width(&self) -> usize {
+    pub(super) fn head_width(&self) -> usize {
         self.width / self.heads
     }
 
-    fn padded_keys(&self) -> usize {
+    pub(super) fn padded_keys(&self) -> usize {
         self.keys.next_multiple_of(CHUNK)
+    }
+
+    /// Numbers in the scores of a window and head.
+    pub(super) fn block(&self) -> usize {
+        self.queries * self.padded_keys()
+    }
+
+    pub(super) fn scratch_len(&self) -> usize {
+        scratch_len(self.queries.max(self.keys), self.head_width())
     }
 }
 
@@ -55,141 +67,156 @@ pub(super) struct Operand {
 }
 
 impl Operand {
-    /// Rows of `window`, of `tokens` each, with the columns of `head`.
-    #[inline(always)]
-    fn window<'v, T>(
-        &self,
-        values: &'v [T],
-        (window, tokens): (usize, usize),
-        (head, width): (usize, usize),
-    ) -> WindowRows<'v, T> {
-        let whole = WindowRows {
+    fn rows<'v, T>(&self, values: &'v [T]) -> WindowRows<'v, T> {
+        WindowRows {
             values,
             start: self.columns.start,
             stride: self.stride,
-        };
-        whole.from(window * tokens, head * width)
+        }
     }
 }
 
-struct Attention<T> {
-    q: Operand,
-    k: Operand,
-    v: Operand,
-    shape: AttentionShape,
-    scale: f64,
-    dropout: Option<(u64, f64)>,
+/// An attention whose operands are known to fit.
+pub(super) struct Attention<T> {
+    pub(super) q: Operand,
+    pub(super) k: Operand,
+    pub(super) v: Operand,
+    /// B, `[1 or heads, queries, keys]`.
+    pub(super) bias: Option<Var>,
+    pub(super) shape: AttentionShape,
+    pub(super) scale: f64,
+    pub(super) dropout: Option<(u64, f64)>,
     /// P, `[windows, heads, queries, padded keys]`.
-    probabilities: Vec<T>,
-}
-
-/// What a gradient is a sum of: rows of `other`, weighted by P or dS.
-struct Sum<'w, T> {
-    /// `[windows, heads, queries, padded keys]`
-    weights: &'w [T],
-    /// Whether a result is a key's, a sum over the queries.
-    of_keys: bool,
-    other: (Operand, &'w [T]),
+    pub(super) probabilities: Vec<T>,
 }
 
 impl<T: Real> Attention<T> {
     /// Adds the sums to the gradient of `of`.
-    fn add_sums(&self, context: &mut Backward<'_, T>, of: Operand, sum: Sum<'_, T>, scratch: &mut [T]) {
-        let Some(target) = context.target(of.columns.value) else {
-            return;
-        };
-        if target.fresh {
-            target.data.fill(T::zero());
+    fn add(
+        &self,
+        context: &mut Backward<'_, T>,
+        of: Operand,
+        sums: Sums<'_, T>,
+        scratch: &mut [T],
+    ) {
+        if let Some(target) = context.target(of.columns.value) {
+            let place = (of.columns.start, of.stride);
+            sums.put(target.so_far(), place, self.shape, true, scratch);
         }
-        let data = target.data;
+    }
+
+    /// Adds B to the scores of every window.
+    fn add_bias(&self, scores: &mut [T], bias: &[T]) {
+        let (keys, padded) = (self.shape.keys, self.shape.padded_keys());
+        let rows = bias.chunks_exact(keys).cycle();
+        for (scores, bias) in scores.chunks_exact_mut(padded).zip(rows) {
+            scores.iter_mut().zip(bias).for_each(|(s, &b)| *s += b);
+        }
+    }
+
+    fn bias_gradient(&self, context: &mut Backward<'_, T>, bias: Var, ds: &[T]) {
+        let (keys, padded) = (self.shape.keys, self.shape.padded_keys());
+        if let Some(target) = context.target(bias) {
+            let dbias = target.so_far();
+            for ds in ds.chunks_exact(dbias.len() / keys * padded) {
+                let rows = dbias.chunks_exact_mut(keys);
+                for (dbias, ds) in rows.zip(ds.chunks_exact(padded)) {
+                    dbias.iter_mut().zip(ds).for_each(|(db, &ds)| *db += ds);
+                }
+            }
+        }
+    }
+
+    /// Records the operation; the output, of shape `output`, has `width` numbers for each query.
+    pub(super) fn record(
+        mut self,
+        tape: &mut Tape<'_, T>,
+        name: &'static str,
+        output: &[usize],
+    ) -> Var {
         let shape = self.shape;
-        let (width, padded) = (shape.head_width(), shape.padded_keys());
-        let block = shape.queries * padded;
-        let (results, others, result, row) = if sum.of_keys {
-            (shape.keys, shape.queries, 1, padded)
-        } else {
-            (shape.queries, shape.keys, padded, 1)
+        let numbers: usize = output.iter().product();
+        let windows = numbers / (shape.queries * shape.width);
+        let mut p = tape.take(windows * shape.heads * shape.block());
+        let mut dropped = match self.dropout {
+            Some(_) => tape.take(p.len()),
+            None => Vec::new(),
         };
+        let mut scratch = tape.take(shape.scratch_len());
+        let mut y = tape.take(numbers);
+        let [q, k, v] = [self.q, self.k, self.v]
+            .map(|operand| operand.rows(tape.values(operand.columns.value)));
+        let scale = T::from_f64(self.scale);
+        scores(&mut p, (q, k), shape, scale, &mut scratch);
+        if let Some(bias) = self.bias {
+            self.add_bias(&mut p, tape.values(bias));
+        }
         vectorised(
             #[inline(always)]
-            || {
-                for (k, values) in sum.weights.chunks_exact(block).enumerate() {
-                    let (window, head) = (k / shape.heads, k % shape.heads);
-                    let from = window * results * of.stride + of.columns.start + head * width;
-                    let (other, other_values) = sum.other;
-                    let x = other.window(other_values, (window, others), (head, width));
-                    let weights = WindowWeights {
-                        values,
-                        result,
-                        row,
-                    };
-                    let out = (&mut data[from..], of.stride, results);
-                    window_sums(out, weights, (x, others), width, true, scratch);
-                }
-            },
+            || window_softmax(&mut p, shape.keys),
         );
+        if let Some((key, rate)) = self.dropout {
+            dropout_into(key, rate, &p, &mut dropped);
+        }
+        let sums = Sums {
+            weights: self.dropout.map_or(&p, |_| &dropped),
+            for_keys: false,
+            rows: v,
+        };
+        sums.put(&mut y, (0, shape.width), shape, false, &mut scratch);
+        tape.give(scratch);
+        tape.give(dropped);
+        if tape.is_recording() {
+            self.probabilities = p;
+        } else {
+            tape.give(p);
+        }
+        let mut inputs = [self.q, self.k, self.v].map(|of| of.columns.value).to_vec();
+        inputs.extend(self.bias);
+        tape.record(name, &inputs, output, y, || self)
     }
 }
 
 impl<T: Real> Operation<T> for Attention<T> {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
-        let shape = self.shape;
-        let (width, padded) = (shape.head_width(), shape.padded_keys());
-        let block = shape.queries * padded;
-        let values = |operand: Operand| context.values(operand.columns.value);
-        let (q, k, v) = (values(self.q), values(self.k), values(self.v));
+        let (shape, p) = (self.shape, &self.probabilities);
+        let [q, k, v] = [self.q, self.k, self.v]
+            .map(|operand| operand.rows(context.values(operand.columns.value)));
         // The output's rows hold all heads, and nothing else.
-        let upstream = Operand {
-            columns: HeadColumns {
-                start: 0,
-                ..self.q.columns
-            },
+        let upstream = WindowRows {
+            values: &*dy,
+            start: 0,
             stride: shape.width,
         };
-        let dy = &*dy;
-        let p = &self.probabilities;
-        let mut scratch = context.take(scratch_len(shape.queries.max(shape.keys), width));
+        let mut scratch = context.take(shape.scratch_len());
 
         let mut dropped = context.take(p.len());
-        match self.dropout {
-            Some((key, rate)) => dropout_into(key, rate, p, &mut dropped),
-            None => dropped.copy_from_slice(p),
-        }
-        let sum = Sum {
+        dropped_into(self.dropout, p, &mut dropped);
+        let sums = Sums {
             weights: &dropped,
-            of_keys: true,
-            other: (upstream, dy),
+            for_keys: true,
+            rows: upstream,
         };
-        self.add_sums(context, self.v, sum, &mut scratch);
+        self.add(context, self.v, sums, &mut scratch);
 
         let mut ds = dropped;
-        vectorised(
-            #[inline(always)]
-            || {
-                for (k, ds) in ds.chunks_exact_mut(block).enumerate() {
-                    let (window, head) = (k / shape.heads, (k % shape.heads, width));
-                    let a = upstream.window(dy, (window, shape.queries), head);
-                    let b = self.v.window(v, (window, shape.keys), head);
-                    window_scores(ds, a, (b, shape.keys), width, T::one(), &mut scratch);
-                }
-            },
-        );
-        if let Some((key, rate)) = self.dropout {
-            let mut dp = context.take(ds.len());
-            dropout_into(key, rate, &ds, &mut dp);
-            context.give(std::mem::replace(&mut ds, dp));
+        let scale = T::from_f64(self.scale);
+        scores(&mut ds, (upstream, v), shape, T::one(), &mut scratch);
+        match self.bias {
+            None => softmax_gradient(context, &mut ds, self.dropout, p, shape.keys, scale),
+            Some(bias) => {
+                softmax_gradient(context, &mut ds, self.dropout, p, shape.keys, T::one());
+                self.bias_gradient(context, bias, &ds);
+                ds.iter_mut().for_each(|ds| *ds *= scale);
+            }
         }
-        vectorised(
-            #[inline(always)]
-            || window_softmax_backward(&mut ds, p, shape.keys, T::from_f64(self.scale)),
-        );
-        for (of, of_keys, other) in [(self.q, false, (self.k, k)), (self.k, true, (self.q, q))] {
-            let sum = Sum {
+        for (of, for_keys, rows) in [(self.q, false, k), (self.k, true, q)] {
+            let sums = Sums {
                 weights: &ds,
-                of_keys,
-                other,
+                for_keys,
+                rows,
             };
-            self.add_sums(context, of, sum, &mut scratch);
+            self.add(context, of, sums, &mut scratch);
         }
         context.give(ds);
         context.give(scratch);
@@ -200,97 +227,20 @@ impl<T: Real> Operation<T> for Attention<T> {
     }
 }
 
-/// Records an attention whose operands are known to fit; the output has `shape.width` columns for each query.
-pub(super) fn record<T: Real>(
-    tape: &mut Tape<'_, T>,
-    name: &'static str,
-    (q, k, v): (Operand, Operand, Operand),
-    (windows, shape): (usize, AttentionShape),
-    scale: f64,
-    p: f64,
-    output: &[usize],
-) -> Var {
-    let (width, padded) = (shape.head_width(), shape.padded_keys());
-    let block = shape.queries * padded;
-    let mut probabilities = tape.take(windows * shape.heads * block);
-    let mut scratch = tape.take(scratch_len(shape.queries.max(shape.keys), width));
-    let mut y = tape.take(windows * shape.queries * shape.width);
-    let dropout = tape
-        .next_dropout_key()
-        .filter(|_| p > 0.0)
-        .map(|key| (key, p));
-    let mut dropped = match dropout {
-        Some(_) => tape.take(probabilities.len()),
-        None => Vec::new(),
-    };
-    let values = |operand: Operand| tape.values(operand.columns.value);
-    let (queries, keys, values) = (values(q), values(k), values(v));
-    vectorised(
-        #[inline(always)]
-        || {
-            for (row, out) in probabilities.chunks_exact_mut(block).enumerate() {
-                let (window, head) = (row / shape.heads, (row % shape.heads, width));
-                let a = q.window(queries, (window, shape.queries), head);
-                let b = k.window(keys, (window, shape.keys), head);
-                let scale = T::from_f64(scale);
-                window_scores(out, a, (b, shape.keys), width, scale, &mut scratch);
-            }
-            window_softmax(&mut probabilities, shape.keys);
-        },
-    );
-    let weights = match dropout {
-        Some((key, p)) => {
-            dropout_into(key, p, &probabilities, &mut dropped);
-            &dropped
-        }
-        None => &probabilities,
-    };
-    vectorised(
-        #[inline(always)]
-        || {
-            for (row, weights) in weights.chunks_exact(block).enumerate() {
-                let (window, head) = (row / shape.heads, row % shape.heads);
-                let from = window * shape.queries * shape.width + head * width;
-                let x = v.window(values, (window, shape.keys), (head, width));
-                let weights = WindowWeights {
-                    values: weights,
-                    result: padded,
-                    row: 1,
-                };
-                let out = (&mut y[from..], shape.width, shape.queries);
-                window_sums(out, weights, (x, shape.keys), width, false, &mut scratch);
-            }
-        },
-    );
-    tape.give(scratch);
-    tape.give(dropped);
-    if !tape.is_recording() {
-        tape.give(std::mem::take(&mut probabilities));
-    }
-    let inputs = [q, k, v].map(|operand| operand.columns.value);
-    tape.record(name, &inputs, output, y, || Attention {
-        q,
-        k,
-        v,
-        shape,
-        scale,
-        dropout,
-        probabilities,
-    })
-}
-
 impl<T: Real> Tape<'_, T> {
-    /// Attention of `shape.queries` tokens to `shape.keys` tokens within each window, as `[windows * queries, width]`; dropout
+    /// Attention of `shape.queries` tokens to `shape.keys` tokens within each window, as
+    /// `[windows * queries, width]`; `bias [1 or heads, queries, keys]`, the same in every window,
+    /// is added to the scores (negative infinity masks a key, but not all keys of a query); dropout
     /// with probability `p` on the attention weights.
     ///
     /// # Errors
-    /// Heads that do not divide the width, columns beyond a value, rows that are no whole windows.
+    /// Heads that do not divide the width, columns beyond a value, rows that are no whole windows,
+    /// a bias of another shape.
     pub fn attention(
         &mut self,
-        q: HeadColumns,
-        k: HeadColumns,
-        v: HeadColumns,
+        [q, k, v]: [HeadColumns; 3],
         shape: AttentionShape,
+        bias: Option<Var>,
         p: f64,
     ) -> Result<Var, AutogradError> {
         let windows = self.windows(q, shape.queries, shape)?;
@@ -301,15 +251,30 @@ impl<T: Real> Tape<'_, T> {
                 return Err(shapes_error("attention", left, right, expected));
             }
         }
+        if let Some(bias) = bias {
+            let wanted = [shape.heads, shape.queries, shape.keys];
+            let found = self.shape(bias);
+            if found != wanted && found != [1, shape.queries, shape.keys] {
+                let expected = "a bias [1 or heads, queries, keys]";
+                return Err(shapes_error("attention", &wanted, found, expected));
+            }
+        }
         let operand = |columns: HeadColumns| Operand {
             columns,
             stride: self.rows_and_columns(columns.value).1,
         };
-        let operands = (operand(q), operand(k), operand(v));
-        let scale = 1.0 / (shape.head_width() as f64).sqrt();
+        let attention = Attention {
+            q: operand(q),
+            k: operand(k),
+            v: operand(v),
+            bias,
+            shape,
+            scale: 1.0 / (shape.head_width() as f64).sqrt(),
+            dropout: self.next_draws(p),
+            probabilities: Vec::new(),
+        };
         let output = [windows * shape.queries, shape.width];
-        let sizes = (windows, shape);
-        Ok(record(self, "attention", operands, sizes, scale, p, &output))
+        Ok(attention.record(self, "attention", &output))
     }
 
     /// Number of windows of `tokens` rows in a value that holds the columns of all heads.
@@ -343,16 +308,27 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::{AttentionShape, HeadColumns};
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
-    /// Self-attention with Q, K, V in one value, and attention between two values; with and without dropout; more keys than
-    /// a padded chunk; small scores and large.
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11, any::<bool>(), strength(), any::<u64>())
-            .prop_map(|(windows, heads, head_width, queries, keys, dropout, strength, seed)| {
+    /// Self-attention with Q, K, V in one value, and attention between two values; with and without
+    /// dropout; without a bias and with one for all heads or for each; more keys than a padded
+    /// chunk; small scores and large.
+    pub fn cases() -> Cases {
+        let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11);
+        let biases = prop_oneof![Just(None), Just(Some(1)), Just(Some(2))];
+        (sizes, biases, any::<bool>(), strength(), any::<u64>())
+            .prop_map(|(sizes, biases, dropout, strength, seed)| {
+                let (windows, heads, head_width, queries, keys) = sizes;
                 let width = heads * head_width;
-                let shapes: [&[usize]; 2] =
-                    [&[windows * queries, 3 * width], &[windows * keys, 2 * width]];
+                let shapes: [&[usize]; 3] = [
+                    &[windows * queries, 3 * width],
+                    &[windows * keys, 2 * width],
+                    &[
+                        biases.map_or(1, |most: usize| most.min(heads)),
+                        queries,
+                        keys,
+                    ],
+                ];
                 case(&shapes, seed, 0.0, move |tape, v| {
                     tape.set_dropout(dropout.then_some(seed));
                     let asking = tape.affine(v[0], strength, 0.0);
@@ -367,10 +343,11 @@ pub(super) mod gradient {
                         keys: queries,
                     };
                     let (q, k, w) = (columns(asking, 0), columns(v[0], 1), columns(v[0], 2));
-                    let own = tape.attention(q, k, w, shape, 0.3)?;
+                    let own = tape.attention([q, k, w], shape, None, 0.3)?;
                     shape.keys = keys;
                     let (k, w) = (columns(v[1], 0), columns(v[1], 1));
-                    let other = tape.attention(q, k, w, shape, 0.3)?;
+                    let bias = biases.map(|_| v[2]);
+                    let other = tape.attention([q, k, w], shape, bias, 0.3)?;
                     tape.add(own, other)
                 })
             })

@@ -66,18 +66,15 @@ pub(super) fn zip_into<T: Real>(
         .for_each(|o, &x, &y| *o = f(x, y));
 }
 
-/// Adds a gradient of the output's shape, its numbers in row-major order, to that of an operand, summed over the axes along which
-/// the operand was broadcast.
+/// Adds a gradient of the output's shape, its numbers in row-major order, to that of an operand,
+/// summed over the axes along which the operand was broadcast.
 pub(super) fn add_reduced<T: Real>(
     target: Target<'_, T>,
     operand: &[usize],
     shape: &[usize],
     gradient: impl Iterator<Item = T>,
 ) {
-    let data = target.data;
-    if target.fresh {
-        data.fill(T::zero());
-    }
+    let data = target.so_far();
     if operand == shape {
         data.iter_mut().zip(gradient).for_each(|(d, g)| *d += g);
         return;
@@ -100,7 +97,8 @@ pub(super) fn add_reduced<T: Real>(
     }
 }
 
-/// How far apart in an operand neighbours along each axis of `shape` lie: 0 where the operand was broadcast.
+/// How far apart in an operand neighbours along each axis of `shape` lie: 0 where the operand was
+/// broadcast.
 fn broadcast_strides(operand: &[usize], shape: &[usize]) -> Vec<usize> {
     let mut strides = vec![0; shape.len()];
     let mut stride = 1;

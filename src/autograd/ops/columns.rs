@@ -1,4 +1,4 @@
-//! Columns: a range of the last axis.
+//! Columns: a range of the last axis; also the core of [`super::rows`] and [`super::strided_rows`].
 //!
 //! ```text
 //! x [.., n] -> y [.., width], y[.., j] = x[.., start + j]; dX is dY there and 0 elsewhere.
@@ -21,22 +21,41 @@ impl<T: Real> Operation<T> for Columns {
         let Some(target) = context.target(self.x) else {
             return;
         };
-        if target.fresh {
-            target.data.fill(T::zero());
-        }
+        let dx = target.so_far();
         if self.width == 0 {
             return;
         }
-        for (dx, dy) in target
-            .data
-            .chunks_exact_mut(self.total)
-            .zip(dy.chunks_exact(self.width))
-        {
+        let rows = dx.chunks_exact_mut(self.total);
+        for (dx, dy) in rows.zip(dy.chunks_exact(self.width)) {
             for (dx, &dy) in dx[self.start..self.start + self.width].iter_mut().zip(dy) {
                 *dx += dy;
             }
         }
     }
+}
+
+/// The columns `range` of `x` seen as rows of `total` numbers, under the shape `shape`.
+pub(super) fn columns_of<T: Real>(
+    tape: &mut Tape<'_, T>,
+    name: &'static str,
+    x: Var,
+    (range, total): (Range<usize>, usize),
+    shape: &[usize],
+) -> Var {
+    let (start, width) = (range.start, range.len());
+    let mut y = tape.take(shape.iter().product());
+    if width > 0 {
+        let rows = tape.values(x).chunks_exact(total);
+        for (y, x) in y.chunks_exact_mut(width).zip(rows) {
+            y.copy_from_slice(&x[range.clone()]);
+        }
+    }
+    tape.record(name, &[x], shape, y, || Columns {
+        x,
+        start,
+        width,
+        total,
+    })
 }
 
 impl<T: Real> Tape<'_, T> {
@@ -45,30 +64,18 @@ impl<T: Real> Tape<'_, T> {
     /// # Errors
     /// A range beyond the last axis.
     pub fn columns(&mut self, x: Var, range: Range<usize>) -> Result<Var, AutogradError> {
-        let (rows, total) = self.rows_and_columns(x);
-        if self.shape(x).is_empty() || range.start > range.end || range.end > total {
-            let argument = format!("columns {range:?}");
-            let expected = "a range within the last axis";
-            return Err(argument_error("columns", self.shape(x), argument, expected));
-        }
-        let (start, width) = (range.start, range.len());
-        let mut y = self.take(rows * width);
-        if width > 0 {
-            let x = self.values(x);
-            for (y, x) in y.chunks_exact_mut(width).zip(x.chunks_exact(total)) {
-                y.copy_from_slice(&x[start..start + width]);
+        let mut shape = self.shape(x).to_vec();
+        match shape.last_mut() {
+            Some(last) if range.start <= range.end && range.end <= *last => {
+                let total = std::mem::replace(last, range.len());
+                Ok(columns_of(self, "columns", x, (range, total), &shape))
+            }
+            _ => {
+                let argument = format!("columns {range:?}");
+                let expected = "a range within the last axis";
+                Err(argument_error("columns", &shape, argument, expected))
             }
         }
-        let mut shape = self.shape(x).to_vec();
-        if let Some(last) = shape.last_mut() {
-            *last = width;
-        }
-        Ok(self.record("columns", &[x], &shape, y, || Columns {
-            x,
-            start,
-            width,
-            total,
-        }))
     }
 }
 
@@ -76,9 +83,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<[prop::sample::Index; 2]>(), any::<u64>())
             .prop_map(|(x, ends, seed)| {
                 let n = x[x.len() - 1];

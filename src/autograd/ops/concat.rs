@@ -84,10 +84,10 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// The first part stands at both ends, so that its gradient adds up.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (0usize..4, 0usize..3, 0usize..3, any::<u64>())
             .prop_map(|(rows, a, b, seed)| {
                 case(&[&[rows, a], &[rows, b]], seed, 0.0, |tape, v| {

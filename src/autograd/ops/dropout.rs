@@ -1,7 +1,8 @@
 //! Dropout.
 //!
 //! ```text
-//! y = x m / (1 - p), m drawn 0 with probability p, else 1; dX = dY m / (1 - p). The mask is drawn again on the way back.
+//! y = x m / (1 - p), m drawn 0 with probability p, else 1; dX = dY m / (1 - p).
+//! The mask is drawn again on the way back.
 //! ```
 
 use crate::autograd::kernels::dropout_into;
@@ -28,9 +29,10 @@ impl<T: Real> Operation<T> for Dropout {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself where dropout is off.
+    /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself
+    /// where dropout is off.
     pub fn dropout(&mut self, x: Var, p: f64) -> Var {
-        let Some(key) = self.next_dropout_key().filter(|_| p > 0.0) else {
+        let Some((key, p)) = self.next_draws(p) else {
             return x;
         };
         let shape = self.shape(x).to_vec();
@@ -44,9 +46,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), 0.0..0.9, any::<u64>())
             .prop_map(|(x, p, seed)| {
                 case(&[&x], seed, 0.0, move |tape, v| {

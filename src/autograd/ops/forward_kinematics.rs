@@ -1,11 +1,14 @@
-//! Forward kinematics: where the joints of a hierarchy are, from the rotation of each in its parent's frame.
+//! Forward kinematics: where the joints of a hierarchy are, from the rotation of each in its
+//! parent's frame.
 //!
 //! ```text
-//! q [rows, 4 J] quaternions (x, y, z, w), o [bodies, 3 J] offsets in the parent's frame -> p [rows, 3 J]; row r is of body r mod bodies
-//! and for joint j with parent k (of a root: k is the world, R the identity, p_k = 0)
-//! p_j = p_k + R(Q_k) o_j, Q_j = Q_k q_j (Hamilton product), R(u, w) v = v + 2 w (u x v) + 2 u x (u x v);
-//! from the last joint to the first, g = dp_j: dp_k += g, do_j = R(Q_k)^T g, dQ_k += the gradient of g . R(Q_k) o_j
-//! and dQ_j conj(q_j), dq_j = conj(Q_k) dQ_j.
+//! q [rows, 4 J] quaternions (x, y, z, w), o [bodies, 3 J] offsets in the parent's frame
+//! -> p [rows, 3 J]; row r is of body r mod bodies and for joint j with parent k
+//! (of a root: k is the world, R the identity, p_k = 0)
+//! p_j = p_k + R(Q_k) o_j, Q_j = Q_k q_j (Hamilton product),
+//! R(u, w) v = v + 2 w (u x v) + 2 u x (u x v);
+//! from the last joint to the first, g = dp_j: dp_k += g, do_j = R(Q_k)^T g,
+//! dQ_k += the gradient of g . R(Q_k) o_j and dQ_j conj(q_j), dq_j = conj(Q_k) dQ_j.
 //! ```
 
 use super::{argument_error, shapes_error};
@@ -46,7 +49,10 @@ impl<T: Real> Operation<T> for ForwardKinematics<T> {
                         let above: Quaternion<T> = at(world, parent);
                         let offset: Vector<T> = at(&offsets[body..], joint);
                         add(&mut dp[3 * parent..], g);
-                        add(&mut dworld[4 * parent..], rotation_gradient(above, offset, g));
+                        add(
+                            &mut dworld[4 * parent..],
+                            rotation_gradient(above, offset, g),
+                        );
                         let own: Quaternion<T> = at(local, joint);
                         add(&mut dworld[4 * parent..], product(dq, conjugate(own)));
                         (rotate(conjugate(above), g), product(conjugate(above), dq))
@@ -73,8 +79,10 @@ impl<T: Real> Operation<T> for ForwardKinematics<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// Positions `[rows, 3 J]` of J joints from unit quaternions (x, y, z, w) `rotations [rows, 4 J]` and `offsets [bodies, 3 J]`, both in
-    /// the parent's frame; `parents` has J entries, a parent before its children. The rows run through the bodies again and again.
+    /// Positions `[rows, 3 J]` of J joints from unit quaternions (x, y, z, w)
+    /// `rotations [rows, 4 J]` and `offsets [bodies, 3 J]`, both in the parent's frame; `parents`
+    /// has J entries, a parent before its children. The rows run through the bodies again and
+    /// again.
     ///
     /// # Errors
     /// Shapes that do not fit; a parent that does not stand before its child.
@@ -90,7 +98,12 @@ impl<T: Real> Tape<'_, T> {
             let argument = format!("parents {parents:?}");
             let expected = "at least one joint, each after its parent";
             let shape = self.shape(rotations);
-            return Err(argument_error("forward_kinematics", shape, argument, expected));
+            return Err(argument_error(
+                "forward_kinematics",
+                shape,
+                argument,
+                expected,
+            ));
         }
         let (left, right) = (self.shape(rotations), self.shape(offsets));
         let (rows, bodies) = match (left, right) {
@@ -115,7 +128,8 @@ impl<T: Real> Tape<'_, T> {
             let positions = &mut positions[row * 3 * joints..(row + 1) * 3 * joints];
             let world = &mut world[row * 4 * joints..(row + 1) * 4 * joints];
             for (joint, &parent) in parents.iter().enumerate() {
-                let (own, offset): (Quaternion<T>, Vector<T>) = (at(local, joint), at(offsets, joint));
+                let (own, offset): (Quaternion<T>, Vector<T>) =
+                    (at(local, joint), at(offsets, joint));
                 let (position, rotation) = match parent {
                     None => (offset, own),
                     Some(parent) => {
@@ -130,7 +144,10 @@ impl<T: Real> Tape<'_, T> {
             }
         }
         // Without a gradient to take the operation is not kept.
-        if ![rotations, offsets].iter().any(|&input| self.needs_gradient(input)) {
+        if ![rotations, offsets]
+            .iter()
+            .any(|&input| self.needs_gradient(input))
+        {
             self.give(std::mem::take(&mut world));
         }
         let (inputs, shape) = ([rotations, offsets], [rows, 3 * joints]);
@@ -213,10 +230,10 @@ fn rotation_gradient<T: Real>(
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// Trees of drawn parents, two roots among them, on quaternions that need not have length 1.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         let parents = prop::collection::vec(any::<Option<prop::sample::Index>>(), 1..5);
         (parents, 0usize..3, 1usize..3, any::<u64>())
             .prop_map(|(drawn, frames, bodies, seed)| {
@@ -226,8 +243,7 @@ pub(super) mod gradient {
                     .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
                     .collect();
                 let joints = parents.len();
-                let shapes: [&[usize]; 2] =
-                    [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
+                let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
                 case(&shapes, seed, 0.0, move |tape, v| {
                     let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
                     // Deep trees of long quaternions grow large.

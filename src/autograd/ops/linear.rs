@@ -6,9 +6,7 @@
 //! ```
 
 use super::shapes_error;
-use crate::autograd::kernels::{
-    Mat, MatMut, product, product_bt, product_packed, vectorised,
-};
+use crate::autograd::kernels::{Mat, MatMut, vectorised};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Linear {
@@ -26,10 +24,7 @@ pub(super) fn bias_gradient<T: Real>(context: &mut Backward<'_, T>, bias: Var, d
     let Some(target) = context.target(bias) else {
         return;
     };
-    if target.fresh {
-        target.data.fill(T::zero());
-    }
-    let data = target.data;
+    let data = target.so_far();
     if data.is_empty() {
         return;
     }
@@ -49,16 +44,11 @@ pub(super) fn input_gradient<T: Real>(
     x: Var,
     weight: Var,
     dy: Mat<'_, T>,
-    inputs: usize,
 ) {
-    let packed = context.packed(weight);
-    let values = context.values(weight);
+    let (known, inputs) = (context.known(), context.shape(weight)[1]);
     if let Some(target) = context.target(x) {
         let dx = MatMut::new(target.data, dy.rows, inputs);
-        match packed {
-            Some(packed) => product_packed(dy, packed, dx, !target.fresh),
-            None => product(dy, Mat::new(values, dy.cols, inputs), dx, !target.fresh),
-        }
+        known.product(dy, weight, dx, !target.fresh);
     }
 }
 
@@ -81,12 +71,13 @@ impl<T: Real> Operation<T> for Linear {
         let dz = Mat::new(dy, self.rows, self.outputs);
         let x = Mat::new(context.values(self.x), self.rows, self.inputs);
         context.weight_gradient(self.weight, dz, x);
-        input_gradient(context, self.x, self.weight, dz, self.inputs);
+        input_gradient(context, self.x, self.weight, dz);
     }
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x W^T + b` for `x [.., in]`, `weight [out, in]`, `bias [out]`, as `[.., out]`; `relu` sets negative numbers to 0.
+    /// `x W^T + b` for `x [.., in]`, `weight [out, in]`, `bias [out]`, as `[.., out]`; `relu` sets
+    /// negative numbers to 0.
     ///
     /// # Errors
     /// Shapes that do not fit.
@@ -98,16 +89,14 @@ impl<T: Real> Tape<'_, T> {
         relu: bool,
     ) -> Result<Var, AutogradError> {
         let (rows, inputs) = self.rows_and_columns(x);
-        let &[outputs, columns] = self.shape(weight) else {
-            let (left, right) = (self.shape(x), self.shape(weight));
-            let expected = "x [.., in] and weight [out, in]";
-            return Err(shapes_error("linear", left, right, expected));
+        let (left, right) = (self.shape(x), self.shape(weight));
+        let outputs = match *right {
+            [outputs, columns] if columns == inputs && !left.is_empty() => outputs,
+            _ => {
+                let expected = "x [.., in] and weight [out, in]";
+                return Err(shapes_error("linear", left, right, expected));
+            }
         };
-        if self.shape(x).is_empty() || columns != inputs {
-            let (left, right) = (self.shape(x), self.shape(weight));
-            let expected = "x [.., in] and weight [out, in]";
-            return Err(shapes_error("linear", left, right, expected));
-        }
         if let Some(bias) = bias
             && self.shape(bias) != [outputs]
         {
@@ -118,13 +107,7 @@ impl<T: Real> Tape<'_, T> {
         let mut y = self.take(rows * outputs);
         let matrix = Mat::new(self.values(x), rows, inputs);
         let out = MatMut::new(&mut y, rows, outputs);
-        match self.packed_transposed(weight) {
-            Some(packed) => product_packed(matrix, packed, out, false),
-            None => {
-                let weight = Mat::new(self.values(weight), outputs, inputs);
-                product_bt(matrix, weight, out, false);
-            }
-        }
+        self.known().product_transposed(matrix, weight, out, false);
         add_bias(&mut y, bias.map(|bias| self.values(bias)), outputs, relu);
         let mut shape = self.shape(x).to_vec();
         if let Some(last) = shape.last_mut() {
@@ -170,14 +153,25 @@ fn add_bias<T: Real>(y: &mut [T], bias: Option<&[T]>, outputs: usize, relu: bool
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
     /// The layer is applied twice, so that its weight's gradient adds up.
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 0usize..4, 0usize..4, any::<bool>(), any::<bool>(), any::<u64>())
+    pub fn cases() -> Cases {
+        (
+            0usize..4,
+            0usize..4,
+            0usize..4,
+            any::<bool>(),
+            any::<bool>(),
+            any::<u64>(),
+        )
             .prop_map(|(rows, inputs, outputs, bias, relu, seed)| {
-                let shapes: [&[usize]; 4] =
-                    [&[rows, inputs], &[2, 1, inputs], &[outputs, inputs], &[outputs]];
+                let shapes: [&[usize]; 4] = [
+                    &[rows, inputs],
+                    &[2, 1, inputs],
+                    &[outputs, inputs],
+                    &[outputs],
+                ];
                 case(&shapes, seed, 0.0, move |tape, v| {
                     let bias = bias.then_some(v[3]);
                     let first = tape.linear(v[0], v[2], bias, relu)?;

@@ -1,14 +1,15 @@
 //! One step of an LSTM, its four gates fused.
 //!
 //! ```text
-//! x [B, in], state [B, 2H] = (h | c), W_ih [4H, in], W_hh [4H, H], b_ih, b_hh [4H] -> new state [B, 2H]:
+//! x [B, in], state [B, 2H] = (h | c), W_ih [4H, in], W_hh [4H, H], b_ih, b_hh [4H]
+//! -> new state [B, 2H]:
 //! (i, f, g, o) = x W_ih^T + h W_hh^T + b_ih + b_hh, sigmoid on i, f, o and tanh on g;
 //! c' = f c + i g, h' = o tanh(c').
 //! ```
 
 use super::linear::{bias_gradient, input_gradient};
 use super::shapes_error;
-use crate::autograd::kernels::{Mat, MatMut, product, product_bt, product_packed, vectorised};
+use crate::autograd::kernels::{Mat, MatMut, vectorised};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
 /// Weights of an LSTM cell on a tape, named and laid out as in PyTorch.
@@ -80,10 +81,10 @@ impl<T: Real> Operation<T> for LstmCell<T> {
         let d = Mat::new(&dgates, batch, 4 * n);
         let x = Mat::new(context.values(self.x), batch, self.inputs);
         context.weight_gradient(w.weight_ih, d, x);
-        context.weight_gradient(w.weight_hh, d, Mat::strided(before, batch, n, 2 * n));
-        input_gradient(context, self.x, w.weight_ih, d, self.inputs);
-        let packed = context.packed(w.weight_hh);
-        let weight = context.values(w.weight_hh);
+        let h = Mat::new(before, batch, 2 * n).columns(0..n);
+        context.weight_gradient(w.weight_hh, d, h);
+        input_gradient(context, self.x, w.weight_ih, d);
+        let known = context.known();
         if let Some(target) = context.target(self.state) {
             let fresh = target.fresh;
             for (target, dy) in target
@@ -94,14 +95,14 @@ impl<T: Real> Operation<T> for LstmCell<T> {
                 if fresh {
                     target[n..].copy_from_slice(&dy[n..]);
                 } else {
-                    target[n..].iter_mut().zip(&dy[n..]).for_each(|(t, &d)| *t += d);
+                    target[n..]
+                        .iter_mut()
+                        .zip(&dy[n..])
+                        .for_each(|(t, &d)| *t += d);
                 }
             }
-            let dh = MatMut::strided(target.data, batch, n, 2 * n);
-            match packed {
-                Some(packed) => product_packed(d, packed, dh, !fresh),
-                None => product(d, Mat::new(weight, 4 * n, n), dh, !fresh),
-            }
+            let dh = MatMut::new(target.data, batch, 2 * n).columns(0..n);
+            known.product(d, w.weight_hh, dh, !fresh);
         }
         context.give(dgates);
         context.give(tanh_c);
@@ -154,19 +155,12 @@ impl<T: Real> Tape<'_, T> {
         }
         let mut gates = self.take(batch * 4 * n);
         let before = self.values(state);
-        let h = Mat::strided(before, batch, n, 2 * n);
-        for (weight, input, accumulate) in [
-            (weight_ih, Mat::new(self.values(x), batch, inputs), false),
-            (weight_hh, h, true),
-        ] {
+        let x_matrix = Mat::new(self.values(x), batch, inputs);
+        let h = Mat::new(before, batch, 2 * n).columns(0..n);
+        for (weight, input, accumulate) in [(weight_ih, x_matrix, false), (weight_hh, h, true)] {
             let out = MatMut::new(&mut gates, batch, 4 * n);
-            match self.packed_transposed(weight) {
-                Some(packed) => product_packed(input, packed, out, accumulate),
-                None => {
-                    let weight = Mat::new(self.values(weight), 4 * n, input.cols);
-                    product_bt(input, weight, out, accumulate);
-                }
-            }
+            self.known()
+                .product_transposed(input, weight, out, accumulate);
         }
         let (b_ih, b_hh) = (self.values(bias_ih), self.values(bias_hh));
         for row in gates.chunks_exact_mut(4 * n) {
@@ -196,15 +190,17 @@ impl<T: Real> Tape<'_, T> {
             self.give(std::mem::take(&mut gates));
         }
         let all = [x, state, weight_ih, weight_hh, bias_ih, bias_hh];
-        Ok(self.record("lstm_cell", &all, &[batch, 2 * n], y, || LstmCell {
-            x,
-            state,
-            weights,
-            batch,
-            inputs,
-            hidden: n,
-            gates,
-        }))
+        Ok(
+            self.record("lstm_cell", &all, &[batch, 2 * n], y, || LstmCell {
+                x,
+                state,
+                weights,
+                batch,
+                inputs,
+                hidden: n,
+                gates,
+            }),
+        )
     }
 }
 
@@ -213,10 +209,11 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::LstmWeights;
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
-    /// Two steps through time, so that the state's gradient flows back and the weights' adds up; gates saturated and not.
-    pub fn cases() -> BoxedStrategy<Case> {
+    /// Two steps through time, so that the state's gradient flows back and the weights' adds up;
+    /// gates saturated and not.
+    pub fn cases() -> Cases {
         (0usize..3, 0usize..4, 1usize..3, strength(), any::<u64>())
             .prop_map(|(batch, inputs, n, strength, seed)| {
                 let shapes: [&[usize]; 6] = [

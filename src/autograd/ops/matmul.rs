@@ -58,9 +58,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (0usize..5, 0usize..5, 0usize..5, any::<u64>())
             .prop_map(|(m, k, n, seed)| {
                 case(&[&[m, k], &[k, n]], seed, 0.0, |tape, v| {

@@ -1,72 +1,49 @@
-//! Operations on a tape, one file each: formula, shapes, forward, backward and the check of its gradient side by side.
+//! Operations on a tape, one file each: formula, shapes, forward, backward and the check of its
+//! gradient side by side.
 //!
-//! Shapes: `[.., k]` is any number of axes before the last. Gradients are named with a `d` before the value's name.
+//! Shapes: `[.., k]` is any number of axes before the last. Gradients are named with a `d` before
+//! the value's name.
 
 use super::error::AutogradError;
 
+mod abs;
+mod add;
+mod add_layer_norm;
+mod affine;
+pub mod attention;
+mod attention_core;
 mod broadcast;
-pub mod unary;
-
-/// Declares the operations: a file that is not named here is not built, and one whose tests do not draw cases
-/// (`cases()` in its `gradient` module) does not compile under test.
-macro_rules! operations {
-    ($($name:ident),* $(,)?) => {
-        $(pub mod $name;)*
-
-        /// Names of all operations.
-        pub const OPERATIONS: &[&str] = &[$(stringify!($name)),*];
-
-        #[cfg(test)]
-        mod gradient_is_that_of_central_differences {
-            $(
-                #[test]
-                fn $name() {
-                    let cases = super::$name::gradient::cases();
-                    crate::autograd::check::property::check(stringify!($name), cases);
-                }
-            )*
-        }
-    };
-}
-
-operations!(
-    abs,
-    add,
-    add_layer_norm,
-    affine,
-    attention,
-    clamp,
-    columns,
-    concat,
-    dropout,
-    exp,
-    forward_kinematics,
-    layer_norm,
-    linear,
-    lstm_cell,
-    matmul,
-    mul,
-    noise,
-    normalise,
-    plu,
-    prelu,
-    query_attention,
-    relu,
-    reshape,
-    rows,
-    shared_attention,
-    sigmoid,
-    softmax,
-    sqrt,
-    square,
-    stack,
-    strided_rows,
-    sub,
-    sum,
-    sum_last,
-    tanh,
-    vector_norm,
-);
+mod clamp;
+mod columns;
+mod concat;
+mod dropout;
+mod exp;
+mod forward_kinematics;
+mod layer_norm;
+mod linear;
+pub mod lstm_cell;
+mod matmul;
+mod mul;
+mod noise;
+mod normalise;
+mod plu;
+mod prelu;
+pub mod query_attention;
+mod reshape;
+mod rows;
+mod shared_attention;
+mod sigmoid;
+mod softmax;
+mod sqrt;
+mod square;
+mod stack;
+mod strided_rows;
+mod sub;
+mod sum;
+mod sum_last;
+mod tanh;
+mod unary;
+mod vector_norm;
 
 fn shapes_error(
     operation: &'static str,
@@ -97,12 +74,66 @@ fn argument_error(
 }
 
 #[cfg(test)]
-mod registry {
-    /// Helpers in this folder that are no operations.
-    const OTHERS: [&str; 3] = ["mod", "broadcast", "unary"];
+mod gradient_is_that_of_central_differences {
+    use crate::autograd::check::property::check;
+
+    /// Files of this folder that are no operations.
+    const OTHERS: [&str; 4] = ["mod", "attention_core", "broadcast", "unary"];
+
+    /// A test of each operation on the cases that its file draws: without them it does not compile.
+    macro_rules! operations {
+        ($($name:ident),* $(,)?) => {
+            const OPERATIONS: &[&str] = &[$(stringify!($name)),*];
+
+            $(
+                #[test]
+                fn $name() {
+                    check(stringify!($name), super::$name::gradient::cases());
+                }
+            )*
+        };
+    }
+
+    operations!(
+        abs,
+        add,
+        add_layer_norm,
+        affine,
+        attention,
+        clamp,
+        columns,
+        concat,
+        dropout,
+        exp,
+        forward_kinematics,
+        layer_norm,
+        linear,
+        lstm_cell,
+        matmul,
+        mul,
+        noise,
+        normalise,
+        plu,
+        prelu,
+        query_attention,
+        reshape,
+        rows,
+        shared_attention,
+        sigmoid,
+        softmax,
+        sqrt,
+        square,
+        stack,
+        strided_rows,
+        sub,
+        sum,
+        sum_last,
+        tanh,
+        vector_norm,
+    );
 
     #[test]
-    fn every_file_of_the_folder_is_a_registered_operation() {
+    fn of_every_file_in_the_folder() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/autograd/ops");
         let mut files: Vec<String> = std::fs::read_dir(folder)
             .expect("the folder is there")
@@ -111,6 +142,6 @@ mod registry {
             .filter(|name| !OTHERS.contains(&name.as_str()))
             .collect();
         files.sort();
-        assert_eq!(files, super::OPERATIONS);
+        assert_eq!(files, OPERATIONS);
     }
 }

@@ -1,7 +1,8 @@
 //! Product of two values, element by element.
 //!
 //! ```text
-//! c = a * b, with a and b broadcast to c's shape; dA = dC * b, dB = dC * a, summed over the broadcast axes.
+//! c = a * b, with a and b broadcast to c's shape;
+//! dA = dC * b, dB = dC * a, summed over the broadcast axes.
 //! ```
 
 use super::broadcast::{add_reduced, broadcast_shape, zip_into};
@@ -48,13 +49,9 @@ impl<T: Real> Tape<'_, T> {
 
 #[cfg(test)]
 pub(super) mod gradient {
-    use proptest::prelude::*;
+    use crate::autograd::check::property::{Cases, of_two_values};
 
-    use crate::autograd::check::property::{Case, broadcast_shapes, case};
-
-    pub fn cases() -> BoxedStrategy<Case> {
-        (broadcast_shapes(), any::<u64>())
-            .prop_map(|((a, b), seed)| case(&[&a, &b], seed, 0.0, |tape, v| tape.mul(v[0], v[1])))
-            .boxed()
+    pub fn cases() -> Cases {
+        of_two_values(|tape, a, b| tape.mul(a, b))
     }
 }

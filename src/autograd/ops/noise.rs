@@ -23,10 +23,10 @@ impl<T: Real> Operation<T> for Noise {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's dropout; `x` itself where dropout is
-    /// off.
+    /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's
+    /// dropout; `x` itself where dropout is off.
     pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
-        let Some(key) = self.next_dropout_key().filter(|_| deviation > 0.0) else {
+        let Some((key, deviation)) = self.next_draws(deviation) else {
             return x;
         };
         let shape = self.shape(x).to_vec();
@@ -44,9 +44,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), 0.0..2.0, any::<u64>())
             .prop_map(|(x, deviation, seed)| {
                 case(&[&x], seed, 0.0, move |tape, v| {

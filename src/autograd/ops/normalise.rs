@@ -1,7 +1,8 @@
 //! Vectors scaled to length 1, such as quaternions.
 //!
 //! ```text
-//! x [.., k width], in vectors of `width` numbers -> y = x / n, n = sqrt(x . x + eps); dX = (dY - y (y . dY)) / n.
+//! x [.., k width], in vectors of `width` numbers -> y = x / n, n = sqrt(x . x + eps);
+//! dX = (dY - y (y . dY)) / n.
 //! ```
 
 use super::argument_error;
@@ -25,7 +26,9 @@ impl<T: Real> Operation<T> for Normalise<T> {
         for (dy, (x, y)) in dy.chunks_exact_mut(width).zip(vectors) {
             let along = sum_with(width, |i| y[i] * dy[i]);
             let n = length(x, self.eps);
-            dy.iter_mut().zip(y).for_each(|(dy, &y)| *dy = (*dy - y * along) / n);
+            dy.iter_mut()
+                .zip(y)
+                .for_each(|(dy, &y)| *dy = (*dy - y * along) / n);
         }
         if let Some(target) = context.target(self.x) {
             target.add(|i| dy[i]);
@@ -34,8 +37,8 @@ impl<T: Real> Operation<T> for Normalise<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// `x [.., k width]` with each `width` numbers in a row scaled to a vector of length 1; `eps` (above 0) keeps the gradient finite
-    /// at 0.
+    /// `x [.., k width]` with each `width` numbers in a row scaled to a vector of length 1; `eps`
+    /// (above 0) keeps the gradient finite at 0.
     ///
     /// # Errors
     /// A last axis that is no multiple of `width`.
@@ -61,15 +64,17 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), 1usize..5, any::<u64>())
             .prop_map(|(mut x, width, seed)| {
                 if let Some(last) = x.last_mut() {
                     *last *= width;
                 }
-                case(&[&x], seed, 0.1, move |tape, v| tape.normalise(v[0], width, 1e-3))
+                case(&[&x], seed, 0.1, move |tape, v| {
+                    tape.normalise(v[0], width, 1e-3)
+                })
             })
             .boxed()
     }

@@ -1,4 +1,5 @@
-//! Piecewise linear unit (Nicolae 2018, with its alpha = 0.1 and c = 1): the identity around 0, flat beyond.
+//! Piecewise linear unit (Nicolae 2018, with its alpha = 0.1 and c = 1): the identity around 0,
+//! flat beyond.
 //!
 //! ```text
 //! y = max(alpha (x + c) - c, min(alpha (x - c) + c, x)); dX = dY where |x| < c, else alpha dY.
@@ -44,10 +45,11 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    /// The numbers, which keep a margin from 0, are shifted so that the one kink or the other lies there.
-    pub fn cases() -> BoxedStrategy<Case> {
+    /// The numbers, which keep a margin from 0, are shifted so that the one kink or the other lies
+    /// there.
+    pub fn cases() -> Cases {
         (shapes(), any::<bool>(), any::<u64>())
             .prop_map(|(x, upper, seed)| {
                 let kink = if upper { super::C } else { -super::C };

@@ -1,7 +1,8 @@
 //! Parametric rectified linear unit (He et al. 2015) with one learned slope.
 //!
 //! ```text
-//! x [..], slope [1] -> y = x where x > 0, else slope x; dX = dY or slope dY, dslope = sum of dY x where x <= 0.
+//! x [..], slope [1] -> y = x where x > 0, else slope x;
+//! dX = dY or slope dY, dslope = sum of dY x where x <= 0.
 //! ```
 
 use super::shapes_error;
@@ -76,13 +77,11 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<u64>())
-            .prop_map(|(x, seed)| {
-                case(&[&x, &[1]], seed, 0.01, |tape, v| tape.prelu(v[0], v[1]))
-            })
+            .prop_map(|(x, seed)| case(&[&x, &[1]], seed, 0.01, |tape, v| tape.prelu(v[0], v[1])))
             .boxed()
     }
 }

@@ -1,21 +1,24 @@
 //! Multi-head attention of one query a window, with the keys' and values' projections inside.
 //!
+//! With a single query the projections of the keys and values need not be made:
+//! q . (W_k x) = (W_k^T q) . x and sum_j p_j W_v x_j = W_v sum_j p_j x_j. (The keys' bias adds the
+//! same number to every score of a window, which the softmax ignores.)
+//!
 //! ```text
-//! With a single query the projections of the keys and values need not be made: q . (W_k x) = (W_k^T q) . x and
-//! sum_j p_j W_v x_j = W_v sum_j p_j x_j. q [B, d] (projected), x [B * n, d'], for each head W_k, W_v [dh, d'], b_v [d]:
+//! q [B, d] (projected), x [B * n, d'], for each head W_k, W_v [dh, d'], b_v [d]:
 //! u = q_h W_k [d'], s_j = u . x_j / sqrt(dh), p = softmax(s), m = dropout(p), z = sum_j m_j x_j,
 //! y_h = W_v z + b_v,h sum_j m_j.
-//! (The keys' bias adds the same number to every score of a window, which the softmax ignores.)
-//! dz = W_v^T dy_h, dm_j = dz . x_j + b_v,h . dy_h, ds by dropout and softmax, du = sum_j ds_j x_j / sqrt(dh),
-//! dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du, dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
+//! dz = W_v^T dy_h, dm_j = dz . x_j + b_v,h . dy_h, ds by dropout and softmax,
+//! du = sum_j ds_j x_j / sqrt(dh), dx_j = m_j dz + ds_j u / sqrt(dh), dq_h = W_k du,
+//! dW_k = q_h^T du, dW_v = dy_h^T z, db_v,h = sum_B dy_h sum_j m_j.
 //! ```
 
+use std::ops::Range;
+
+use super::attention::AttentionShape;
+use super::attention_core::{Sums, scores, softmax_gradient};
 use super::{argument_error, shapes_error};
-use crate::autograd::kernels::{
-    CHUNK, Mat, MatMut, WindowRows, WindowWeights, dropout_into, product, product_bt,
-    product_packed, scratch_len, vectorised, window_scores, window_softmax,
-    window_softmax_backward, window_sums,
-};
+use crate::autograd::kernels::{Mat, MatMut, WindowRows, dropped_into, vectorised, window_softmax};
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
@@ -41,8 +44,14 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn padded(&self) -> usize {
-        self.tokens.next_multiple_of(CHUNK)
+    /// The heads of a query are so many queries to the same tokens, as they are.
+    fn shape(&self) -> AttentionShape {
+        AttentionShape {
+            heads: 1,
+            width: self.width,
+            queries: self.heads,
+            keys: self.tokens,
+        }
     }
 
     /// Columns of all heads of a query, d.
@@ -54,19 +63,23 @@ impl Sizes {
         T::one() / T::from_f64(self.head_width as f64).sqrt()
     }
 
-    /// Length of the scratch of a window's products.
-    fn scratch_len(&self) -> usize {
-        scratch_len(self.tokens.max(self.heads), self.width)
+    /// Columns of a head in queries and outputs.
+    fn head(&self, h: usize) -> Range<usize> {
+        h * self.head_width..(h + 1) * self.head_width
     }
-}
 
-/// `values [rows, width]` as rows of a window.
-#[inline(always)]
-fn rows<T>(values: &[T], width: usize) -> WindowRows<'_, T> {
-    WindowRows {
-        values,
-        start: 0,
-        stride: width,
+    /// Columns of a head in u and z.
+    fn tokens_of_head(&self, h: usize) -> Range<usize> {
+        h * self.width..(h + 1) * self.width
+    }
+
+    /// Tokens, or what is made of them for each head, as rows.
+    fn rows<'v, T>(&self, values: &'v [T]) -> WindowRows<'v, T> {
+        WindowRows {
+            values,
+            start: 0,
+            stride: self.width,
+        }
     }
 }
 
@@ -86,67 +99,9 @@ struct QueryAttention<T> {
     z: Vec<T>,
 }
 
-/// The columns of one head in `values [rows, stride]`, for reading.
-fn columns<T: Real>(values: &[T], rows: usize, stride: usize, start: usize, n: usize) -> Mat<'_, T> {
-    if rows == 0 {
-        return Mat::new(&[], 0, n);
-    }
-    Mat::strided(&values[start..], rows, n, stride)
-}
-
-fn columns_mut<T: Real>(
-    values: &mut [T],
-    rows: usize,
-    stride: usize,
-    start: usize,
-    n: usize,
-) -> MatMut<'_, T> {
-    if rows == 0 {
-        return MatMut::new(&mut [], 0, n);
-    }
-    MatMut::strided(&mut values[start..], rows, n, stride)
-}
-
-/// out[b, h, j] = scale * a[b, h] . x[b, j]; the padding gets 0.
-fn scores<T: Real>(out: &mut [T], a: &[T], x: &[T], sizes: Sizes, scale: T, scratch: &mut [T]) {
-    vectorised(
-        #[inline(always)]
-        || {
-            for (window, out) in out
-                .chunks_exact_mut(sizes.heads * sizes.padded())
-                .enumerate()
-            {
-                let a = rows(a, sizes.width).from(window * sizes.heads, 0);
-                let x = rows(x, sizes.width).from(window * sizes.tokens, 0);
-                window_scores(out, a, (x, sizes.tokens), sizes.width, scale, scratch);
-            }
-        },
-    );
-}
-
-/// out[b, h] = sum_j weights[b, h, j] x[b, j].
-fn weighted_sums<T: Real>(out: &mut [T], weights: &[T], x: &[T], sizes: Sizes, scratch: &mut [T]) {
-    let (width, padded) = (sizes.width, sizes.padded());
-    vectorised(
-        #[inline(always)]
-        || {
-            for (window, out) in out.chunks_exact_mut(sizes.heads * width).enumerate() {
-                let weights = WindowWeights {
-                    values: &weights[window * sizes.heads * padded..],
-                    result: padded,
-                    row: 1,
-                };
-                let x = rows(x, width).from(window * sizes.tokens, 0);
-                let out = (out, width, sizes.heads);
-                window_sums(out, weights, (x, sizes.tokens), width, false, scratch);
-            }
-        },
-    );
-}
-
 impl<T: Real> Operation<T> for QueryAttention<T> {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
-        let sizes = self.sizes;
+        let (sizes, shape, known) = (self.sizes, self.sizes.shape(), context.known());
         let Sizes {
             batch,
             tokens,
@@ -154,42 +109,42 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
             head_width: dh,
             width,
         } = sizes;
-        let (all, padded) = (sizes.query_width(), sizes.padded());
-        let x = context.values(self.x);
-        let q = context.values(self.q);
+        let (all, padded) = (sizes.query_width(), shape.padded_keys());
+        let (x, q) = (context.values(self.x), context.values(self.q));
+        let rows = sizes.rows(x);
 
         // dz, and the gradients of W_v and b_v.
         let mut dz = context.take(batch * heads * width);
         for (h, &weight) in self.weights.values.iter().enumerate() {
-            let dy_h = columns(dy, batch, all, h * dh, dh);
-            let z_h = columns(&self.z, batch, heads * width, h * width, width);
+            let dy_h = Mat::new(dy, batch, all).columns(sizes.head(h));
+            let z_h = Mat::new(&self.z, batch, heads * width).columns(sizes.tokens_of_head(h));
             context.weight_gradient(weight, dy_h, z_h);
-            let dz_h = columns_mut(&mut dz, batch, heads * width, h * width, width);
-            match context.packed(weight) {
-                Some(packed) => product_packed(dy_h, packed, dz_h, false),
-                None => {
-                    let weight = Mat::new(context.values(weight), dh, width);
-                    product(dy_h, weight, dz_h, false);
-                }
-            }
+            let dz = MatMut::new(&mut dz, batch, heads * width);
+            known.product(dy_h, weight, dz.columns(sizes.tokens_of_head(h)), false);
         }
         let bias = context.values(self.weights.value_bias);
         if let Some(target) = context.target(self.weights.value_bias) {
-            if target.fresh {
-                target.data.fill(T::zero());
-            }
+            let db = target.so_far();
             for (row, dy) in dy.chunks_exact(dh).enumerate() {
-                let sum: T = self.m[row * padded..(row + 1) * padded].iter().copied().sum();
-                let head = row % heads;
-                let db = &mut target.data[head * dh..(head + 1) * dh];
+                let sum: T = self.m[row * padded..(row + 1) * padded]
+                    .iter()
+                    .copied()
+                    .sum();
+                let db = &mut db[sizes.head(row % heads)];
                 db.iter_mut().zip(dy).for_each(|(db, &dy)| *db += dy * sum);
             }
         }
 
         // ds in place of dm.
-        let mut scratch = context.take(sizes.scratch_len());
+        let mut scratch = context.take(shape.scratch_len());
         let mut ds = context.take(batch * heads * padded);
-        scores(&mut ds, &dz, x, sizes, T::one(), &mut scratch);
+        scores(
+            &mut ds,
+            (sizes.rows(&dz), rows),
+            shape,
+            T::one(),
+            &mut scratch,
+        );
         vectorised(
             #[inline(always)]
             || {
@@ -204,56 +159,35 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
                 }
             },
         );
-        if let Some((key, rate)) = self.dropout {
-            let mut dp = context.take(ds.len());
-            dropout_into(key, rate, &ds, &mut dp);
-            context.give(std::mem::replace(&mut ds, dp));
-        }
-        vectorised(
-            #[inline(always)]
-            || window_softmax_backward(&mut ds, &self.p, tokens, sizes.scale()),
+        softmax_gradient(
+            context,
+            &mut ds,
+            self.dropout,
+            &self.p,
+            tokens,
+            sizes.scale(),
         );
         let mut du = context.take(batch * heads * width);
-        weighted_sums(&mut du, &ds, x, sizes, &mut scratch);
-
+        let sums = |weights, for_keys, rows| Sums {
+            weights,
+            for_keys,
+            rows,
+        };
+        sums(&ds, false, rows).put(&mut du, (0, width), shape, false, &mut scratch);
         if let Some(target) = context.target(self.x) {
-            let (fresh, data) = (target.fresh, target.data);
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (window, dx) in data.chunks_exact_mut(tokens * width).enumerate() {
-                        let parts = [(&self.m, &dz), (&ds, &self.u)];
-                        for (k, (weights, rows_of)) in parts.into_iter().enumerate() {
-                            let weights = WindowWeights {
-                                values: &weights[window * heads * padded..],
-                                result: 1,
-                                row: padded,
-                            };
-                            let a = rows(rows_of, width).from(window * heads, 0);
-                            let out = (&mut *dx, width, tokens);
-                            let accumulate = k > 0 || !fresh;
-                            window_sums(out, weights, (a, heads), width, accumulate, &mut scratch);
-                        }
-                    }
-                },
-            );
+            let (data, place) = (target.data, (0, width));
+            let (of_values, of_keys) = (sizes.rows(&dz), sizes.rows(&self.u));
+            sums(&self.m, true, of_values).put(data, place, shape, !target.fresh, &mut scratch);
+            sums(&ds, true, of_keys).put(data, place, shape, true, &mut scratch);
         }
 
         for (h, &weight) in self.weights.keys.iter().enumerate() {
-            let q_h = columns(q, batch, all, h * dh, dh);
-            let du_h = columns(&du, batch, heads * width, h * width, width);
+            let q_h = Mat::new(q, batch, all).columns(sizes.head(h));
+            let du_h = Mat::new(&du, batch, heads * width).columns(sizes.tokens_of_head(h));
             context.weight_gradient(weight, q_h, du_h);
-            let packed = context.packed_transposed(weight);
-            let values = context.values(weight);
             if let Some(target) = context.target(self.q) {
-                if target.fresh && h == 0 {
-                    target.data.fill(T::zero());
-                }
-                let dq_h = columns_mut(target.data, batch, all, h * dh, dh);
-                match packed {
-                    Some(packed) => product_packed(du_h, packed, dq_h, true),
-                    None => product_bt(du_h, Mat::new(values, dh, width), dq_h, true),
-                }
+                let dq = MatMut::new(target.so_far(), batch, all);
+                known.product_transposed(du_h, weight, dq.columns(sizes.head(h)), true);
             }
         }
         for buffer in [dz, ds, du, scratch] {
@@ -269,8 +203,9 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
 }
 
 impl<T: Real> Tape<'_, T> {
-    /// Attention of one query a window, `q [B, d]`, to its `tokens` tokens in `x [B * tokens, d']`, as `[B, d]`; dropout with
-    /// probability `p` on the attention weights. Equal to projecting keys and values and then [`Tape::attention`].
+    /// Attention of one query a window, `q [B, d]`, to its `tokens` tokens in `x [B * tokens, d']`,
+    /// as `[B, d]`; dropout with probability `p` on the attention weights. Equal to projecting keys
+    /// and values and then [`Tape::attention`].
     ///
     /// # Errors
     /// Shapes that do not fit.
@@ -283,6 +218,7 @@ impl<T: Real> Tape<'_, T> {
         p: f64,
     ) -> Result<Var, AutogradError> {
         let sizes = self.query_attention_sizes(q, x, &weights, tokens)?;
+        let shape = sizes.shape();
         let Sizes {
             batch,
             heads,
@@ -290,49 +226,49 @@ impl<T: Real> Tape<'_, T> {
             width,
             ..
         } = sizes;
-        let (all, padded) = (sizes.query_width(), sizes.padded());
+        let (all, padded) = (sizes.query_width(), shape.padded_keys());
         let mut u = self.take(batch * heads * width);
         let mut z = self.take(batch * heads * width);
         let mut attention = self.take(batch * heads * padded);
         let mut m = self.take(batch * heads * padded);
         let mut y = self.take(batch * all);
-        let mut scratch = self.take(sizes.scratch_len());
-        let dropout = self
-            .next_dropout_key()
-            .filter(|_| p > 0.0)
-            .map(|key| (key, p));
-        let (queries, tokens_x) = (self.values(q), self.values(x));
+        let mut scratch = self.take(shape.scratch_len());
+        let dropout = self.next_draws(p);
+        let (known, rows) = (self.known(), sizes.rows(self.values(x)));
         for (h, &weight) in weights.keys.iter().enumerate() {
-            let q_h = columns(queries, batch, all, h * dh, dh);
-            let u_h = columns_mut(&mut u, batch, heads * width, h * width, width);
-            match self.packed(weight) {
-                Some(packed) => product_packed(q_h, packed, u_h, false),
-                None => product(q_h, Mat::new(self.values(weight), dh, width), u_h, false),
-            }
+            let q_h = Mat::new(self.values(q), batch, all).columns(sizes.head(h));
+            let u = MatMut::new(&mut u, batch, heads * width);
+            known.product(q_h, weight, u.columns(sizes.tokens_of_head(h)), false);
         }
-        scores(&mut attention, &u, tokens_x, sizes, sizes.scale(), &mut scratch);
+        let scale = sizes.scale();
+        scores(
+            &mut attention,
+            (sizes.rows(&u), rows),
+            shape,
+            scale,
+            &mut scratch,
+        );
         vectorised(
             #[inline(always)]
             || window_softmax(&mut attention, tokens),
         );
-        match dropout {
-            Some((key, rate)) => dropout_into(key, rate, &attention, &mut m),
-            None => m.copy_from_slice(&attention),
-        }
-        weighted_sums(&mut z, &m, tokens_x, sizes, &mut scratch);
+        dropped_into(dropout, &attention, &mut m);
+        let sums = Sums {
+            weights: &m,
+            for_keys: false,
+            rows,
+        };
+        sums.put(&mut z, (0, width), shape, false, &mut scratch);
         let bias = self.values(weights.value_bias);
         for (row, y) in y.chunks_exact_mut(dh).enumerate() {
             let sum: T = m[row * padded..(row + 1) * padded].iter().copied().sum();
-            let bias = &bias[row % heads * dh..][..dh];
+            let bias = &bias[sizes.head(row % heads)];
             y.iter_mut().zip(bias).for_each(|(y, &b)| *y = b * sum);
         }
         for (h, &weight) in weights.values.iter().enumerate() {
-            let z_h = columns(&z, batch, heads * width, h * width, width);
-            let y_h = columns_mut(&mut y, batch, all, h * dh, dh);
-            match self.packed_transposed(weight) {
-                Some(packed) => product_packed(z_h, packed, y_h, true),
-                None => product_bt(z_h, Mat::new(self.values(weight), dh, width), y_h, true),
-            }
+            let z_h = Mat::new(&z, batch, heads * width).columns(sizes.tokens_of_head(h));
+            let y = MatMut::new(&mut y, batch, all);
+            known.product_transposed(z_h, weight, y.columns(sizes.head(h)), true);
         }
         self.give(scratch);
         let mut inputs = vec![q, x, weights.value_bias];
@@ -344,16 +280,18 @@ impl<T: Real> Tape<'_, T> {
             }
         }
         Ok(
-            self.record("query_attention", &inputs, &[batch, all], y, || QueryAttention {
-                q,
-                x,
-                weights,
-                sizes,
-                dropout,
-                u,
-                p: attention,
-                m,
-                z,
+            self.record("query_attention", &inputs, &[batch, all], y, || {
+                QueryAttention {
+                    q,
+                    x,
+                    weights,
+                    sizes,
+                    dropout,
+                    u,
+                    p: attention,
+                    m,
+                    z,
+                }
             }),
         )
     }
@@ -366,14 +304,22 @@ impl<T: Real> Tape<'_, T> {
         tokens: usize,
     ) -> Result<Sizes, AutogradError> {
         const NAME: &str = "query_attention";
-        let (&[batch, all], &[rows, width]) = (self.shape(q), self.shape(x)) else {
-            let (left, right) = (self.shape(q), self.shape(x));
-            return Err(shapes_error(NAME, left, right, "q [B, d] and x [B * n, d']"));
+        let (left, right) = (self.shape(q), self.shape(x));
+        let (batch, all, width) = match (left, right) {
+            (&[batch, all], &[rows, width])
+                if tokens > 0 && rows == batch * tokens && width > 0 =>
+            {
+                (batch, all, width)
+            }
+            _ => {
+                return Err(shapes_error(
+                    NAME,
+                    left,
+                    right,
+                    "q [B, d] and x [B * n, d']",
+                ));
+            }
         };
-        if tokens == 0 || rows != batch * tokens || width == 0 {
-            let (left, right) = (self.shape(q), self.shape(x));
-            return Err(shapes_error(NAME, left, right, "q [B, d] and x [B * n, d']"));
-        }
         let heads = weights.keys.len();
         if heads == 0 || weights.values.len() != heads || all == 0 || all % heads != 0 {
             let argument = format!("{heads} heads");
@@ -407,11 +353,19 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::QueryAttentionWeights;
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
     /// Two heads that share no weight, with and without dropout; small scores and large.
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..10, 1usize..3, 1usize..4, any::<bool>(), strength(), any::<u64>())
+    pub fn cases() -> Cases {
+        (
+            0usize..3,
+            1usize..10,
+            1usize..3,
+            1usize..4,
+            any::<bool>(),
+            strength(),
+            any::<u64>(),
+        )
             .prop_map(|(batch, tokens, dh, width, dropout, strength, seed)| {
                 let weight: &[usize] = &[dh, width];
                 let shapes: [&[usize]; 7] = [

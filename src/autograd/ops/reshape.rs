@@ -39,9 +39,9 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<u64>())
             .prop_map(|(x, seed)| {
                 let mut reversed = x.clone();

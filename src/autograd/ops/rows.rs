@@ -7,26 +7,8 @@
 use std::ops::Range;
 
 use super::argument_error;
-use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
-
-struct Rows {
-    x: Var,
-    numbers: Range<usize>,
-}
-
-impl<T: Real> Operation<T> for Rows {
-    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
-        let Some(target) = context.target(self.x) else {
-            return;
-        };
-        if target.fresh {
-            target.data.fill(T::zero());
-        }
-        for (dx, &dy) in target.data[self.numbers.clone()].iter_mut().zip(&*dy) {
-            *dx += dy;
-        }
-    }
-}
+use super::columns::columns_of;
+use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
     /// The rows `range` of `x [n, ..]`, as `[range.len(), ..]`.
@@ -43,12 +25,9 @@ impl<T: Real> Tape<'_, T> {
         }
         let width: usize = shape.iter().skip(1).product();
         let numbers = range.start * width..range.end * width;
-        if let Some(first) = shape.first_mut() {
-            *first = range.len();
-        }
-        let mut y = self.take(numbers.len());
-        y.copy_from_slice(&self.values(x)[numbers.clone()]);
-        Ok(self.record("rows", &[x], &shape, y, || Rows { x, numbers }))
+        shape[0] = range.len();
+        let all = total * width;
+        Ok(columns_of(self, "rows", x, (numbers, all), &shape))
     }
 }
 
@@ -56,14 +35,16 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<[prop::sample::Index; 2]>(), any::<u64>())
             .prop_map(|(x, ends, seed)| {
                 let (a, b) = (ends[0].index(x[0] + 1), ends[1].index(x[0] + 1));
                 let range = a.min(b)..a.max(b);
-                case(&[&x], seed, 0.0, move |tape, v| tape.rows(v[0], range.clone()))
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    tape.rows(v[0], range.clone())
+                })
             })
             .boxed()
     }

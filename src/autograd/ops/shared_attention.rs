@@ -1,20 +1,24 @@
-//! Attention of several heads to keys and values that they share: the tokens themselves (multi-query attention, Shazeer 2019).
+//! Attention of several heads to keys and values that they share: the tokens themselves
+//! (multi-query attention, Shazeer 2019).
 //!
 //! ```text
-//! q [windows * t, heads * c], x [windows * t, c] -> y [windows * t, heads * c]; for each window and head, with q_h [t, c]:
+//! q [windows * t, heads * c], x [windows * t, c] -> y [windows * t, heads * c];
+//! for each window and head, with q_h [t, c]:
 //! S = scale q_h x^T [t, t], P = softmax(S), D = dropout(P), y_h = D x.
 //! ```
 //!
-//! The heads of a token are so many more queries to the same window: the rest is [`super::attention`] with one head.
+//! The heads of a token are so many more queries to the same window: the rest is
+//! [`super::attention`] with one head.
 
-use super::attention::{AttentionShape, HeadColumns, Operand, record};
+use super::attention::{Attention, AttentionShape, HeadColumns, Operand};
 use super::shapes_error;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
-    /// Attention of each window's `tokens` tokens to each other, with queries `q [windows * tokens, heads * c]` and the tokens
-    /// `x [windows * tokens, c]` as keys and values of every head, as `[windows * tokens, heads * c]`; scores times `scale`,
-    /// dropout with probability `p` on the attention weights.
+    /// Attention of each window's `tokens` tokens to each other, with queries
+    /// `q [windows * tokens, heads * c]` and the tokens `x [windows * tokens, c]` as keys and
+    /// values of every head, as `[windows * tokens, heads * c]`; scores times `scale`, dropout with
+    /// probability `p` on the attention weights.
     ///
     /// # Errors
     /// Rows that are no whole windows, queries that are not some heads of c columns for each token.
@@ -46,10 +50,17 @@ impl<T: Real> Tape<'_, T> {
             columns: HeadColumns { value, start: 0 },
             stride: width,
         };
-        let operands = (operand(q), operand(x), operand(x));
-        let sizes = (rows / tokens, shape);
-        let output = [rows, all];
-        Ok(record(self, "shared_attention", operands, sizes, scale, p, &output))
+        let attention = Attention {
+            q: operand(q),
+            k: operand(x),
+            v: operand(x),
+            bias: None,
+            shape,
+            scale,
+            dropout: self.next_draws(p),
+            probabilities: Vec::new(),
+        };
+        Ok(attention.record(self, "shared_attention", &[rows, all]))
     }
 }
 
@@ -57,17 +68,30 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, strength};
+    use crate::autograd::check::property::{Cases, case, strength};
 
     /// With and without dropout; more tokens than a padded chunk; small scores and large.
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..3, 1usize..11, 1usize..4, 1usize..4, any::<bool>(), strength(), any::<u64>())
+    pub fn cases() -> Cases {
+        (
+            0usize..3,
+            1usize..11,
+            1usize..4,
+            1usize..4,
+            any::<bool>(),
+            strength(),
+            any::<u64>(),
+        )
             .prop_map(|(windows, tokens, heads, width, dropout, strength, seed)| {
                 let rows = windows * tokens;
-                case(&[&[rows, heads * width], &[rows, width]], seed, 0.0, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
-                })
+                case(
+                    &[&[rows, heads * width], &[rows, width]],
+                    seed,
+                    0.0,
+                    move |tape, v| {
+                        tape.set_dropout(dropout.then_some(seed));
+                        tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
+                    },
+                )
             })
             .boxed()
     }

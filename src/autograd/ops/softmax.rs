@@ -1,7 +1,8 @@
 //! Softmax along the last axis.
 //!
 //! ```text
-//! x [.., n] -> y [.., n], y_j = exp(x_j - max) / sum_k exp(x_k - max); dX_j = y_j (dY_j - sum_k dY_k y_k).
+//! x [.., n] -> y [.., n], y_j = exp(x_j - max) / sum_k exp(x_k - max);
+//! dX_j = y_j (dY_j - sum_k dY_k y_k).
 //! ```
 
 use crate::autograd::reduce::sum_with;
@@ -14,10 +15,12 @@ struct Softmax {
 
 impl<T: Real> Operation<T> for Softmax {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
-        let y = context.output();
-        let columns = self.columns.max(1);
-        for (dy, y) in dy.chunks_exact_mut(columns).zip(y.chunks_exact(columns)) {
-            softmax_backward(dy, y);
+        let rows = context.output().chunks_exact(self.columns);
+        for (dy, y) in dy.chunks_exact_mut(self.columns).zip(rows) {
+            let mean = sum_with(y.len(), |j| dy[j] * y[j]);
+            dy.iter_mut()
+                .zip(y)
+                .for_each(|(d, &y)| *d = y * (*d - mean));
         }
         if let Some(target) = context.target(self.x) {
             target.add_values(dy);
@@ -25,54 +28,26 @@ impl<T: Real> Operation<T> for Softmax {
     }
 }
 
-/// x - max in place for one row.
-#[inline(always)]
-fn shifted<T: Real>(x: &mut [T]) {
-    let mut max = T::neg_infinity();
-    for &x in &*x {
-        if x > max || x.is_nan() {
-            max = x;
-        }
-    }
-    for x in x {
-        *x -= max;
-    }
-}
-
-/// Softmax of each row of `x [rows, columns]`, in place.
-pub(super) fn softmax_rows<T: Real>(x: &mut [T], columns: usize) {
-    if columns == 0 {
-        return;
-    }
-    for row in x.chunks_exact_mut(columns) {
-        shifted(row);
-    }
-    T::exp_slice(x);
-    for row in x.chunks_exact_mut(columns) {
-        let scale = T::one() / sum_with(row.len(), |j| row[j]);
-        for x in row {
-            *x *= scale;
-        }
-    }
-}
-
-/// dX of one row, in place of dY.
-#[inline(always)]
-pub(super) fn softmax_backward<T: Real>(dy: &mut [T], y: &[T]) {
-    let mean = sum_with(y.len(), |j| dy[j] * y[j]);
-    for (d, &y) in dy.iter_mut().zip(y) {
-        *d = y * (*d - mean);
-    }
+/// x - max in place for one row; a NaN is its maximum.
+fn shift<T: Real>(row: &mut [T]) {
+    let larger = |max: T, &x: &T| if x > max || x.is_nan() { x } else { max };
+    let max = row.iter().fold(T::neg_infinity(), larger);
+    row.iter_mut().for_each(|x| *x -= max);
 }
 
 impl<T: Real> Tape<'_, T> {
     /// Softmax of each row of `x [.., n]`.
     pub fn softmax(&mut self, x: Var) -> Var {
         let shape = self.shape(x).to_vec();
-        let columns = self.rows_and_columns(x).1;
+        let columns = self.rows_and_columns(x).1.max(1);
         let mut y = self.take(self.values(x).len());
         y.copy_from_slice(self.values(x));
-        softmax_rows(&mut y, columns);
+        y.chunks_exact_mut(columns).for_each(shift);
+        T::exp_slice(&mut y);
+        for row in y.chunks_exact_mut(columns) {
+            let scale = T::one() / sum_with(row.len(), |j| row[j]);
+            row.iter_mut().for_each(|x| *x *= scale);
+        }
         self.record("softmax", &[x], &shape, y, || Softmax { x, columns })
     }
 }
@@ -81,14 +56,16 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes, strength};
+    use crate::autograd::check::property::{Cases, case, shapes, strength};
 
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), strength(), any::<u64>())
-            .prop_map(|(x, strength, seed)| case(&[&x], seed, 0.0, move |tape, v| {
-                let logits = tape.affine(v[0], strength, 0.0);
-                Ok(tape.softmax(logits))
-            }))
+            .prop_map(|(x, strength, seed)| {
+                case(&[&x], seed, 0.0, move |tape, v| {
+                    let logits = tape.affine(v[0], strength, 0.0);
+                    Ok(tape.softmax(logits))
+                })
+            })
             .boxed()
     }
 }

@@ -56,10 +56,10 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case, shapes};
+    use crate::autograd::check::property::{Cases, case, shapes};
 
     /// The first part stands at both ends, so that its gradient adds up.
-    pub fn cases() -> BoxedStrategy<Case> {
+    pub fn cases() -> Cases {
         (shapes(), any::<u64>())
             .prop_map(|(x, seed)| {
                 case(&[&x, &x], seed, 0.0, |tape, v| {

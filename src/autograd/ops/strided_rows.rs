@@ -5,34 +5,8 @@
 //! ```
 
 use super::argument_error;
-use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
-
-struct StridedRows {
-    x: Var,
-    start: usize,
-    step: usize,
-    width: usize,
-}
-
-impl<T: Real> Operation<T> for StridedRows {
-    fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
-        let Some(target) = context.target(self.x) else {
-            return;
-        };
-        if target.fresh {
-            target.data.fill(T::zero());
-        }
-        let width = self.width;
-        if width == 0 {
-            return;
-        }
-        for (row, dy) in dy.chunks_exact(width).enumerate() {
-            let from = (self.start + row * self.step) * width;
-            let dx = &mut target.data[from..from + width];
-            dx.iter_mut().zip(dy).for_each(|(dx, &dy)| *dx += dy);
-        }
-    }
-}
+use super::columns::columns_of;
+use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
     /// Rows `start`, `start + step`, .. of `x [n * step, ..]`, as `[n, ..]`.
@@ -54,22 +28,9 @@ impl<T: Real> Tape<'_, T> {
         }
         let width: usize = shape.iter().skip(1).product();
         shape[0] = rows / step;
-        let mut y = self.take(shape[0] * width);
-        if width > 0 {
-            let x = self.values(x);
-            for (row, y) in y.chunks_exact_mut(width).enumerate() {
-                let from = (start + row * step) * width;
-                y.copy_from_slice(&x[from..from + width]);
-            }
-        }
-        Ok(
-            self.record("strided_rows", &[x], &shape, y, || StridedRows {
-                x,
-                start,
-                step,
-                width,
-            }),
-        )
+        // The rows of a step beside each other.
+        let (numbers, all) = (start * width..(start + 1) * width, step * width);
+        Ok(columns_of(self, "strided_rows", x, (numbers, all), &shape))
     }
 }
 
@@ -77,10 +38,16 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Case, case};
+    use crate::autograd::check::property::{Cases, case};
 
-    pub fn cases() -> BoxedStrategy<Case> {
-        (0usize..4, 1usize..4, 0usize..3, any::<prop::sample::Index>(), any::<u64>())
+    pub fn cases() -> Cases {
+        (
+            0usize..4,
+            1usize..4,
+            0usize..3,
+            any::<prop::sample::Index>(),
+            any::<u64>(),
+        )
             .prop_map(|(n, step, width, start, seed)| {
                 let start = start.index(step);
                 case(&[&[n * step, width]], seed, 0.0, move |tape, v| {

@@ -19,7 +19,7 @@ fn refusal(left: &[usize], right: &[usize], build: Build) -> String {
 
 #[test]
 fn shapes_that_do_not_fit_are_named_with_the_operation() {
-    let cases: [(&str, &[usize], &[usize], Build); 13] = [
+    let cases: [(&str, &[usize], &[usize], Build); 14] = [
         ("add", &[2, 3], &[2, 4], |t, a, b| t.add(a, b)),
         ("sub", &[2, 3], &[3, 3], |t, a, b| t.sub(a, b)),
         ("mul", &[5], &[4], |t, a, b| t.mul(a, b)),
@@ -56,6 +56,17 @@ fn shapes_that_do_not_fit_are_named_with_the_operation() {
             };
             t.query_attention(a, b, weights, 3, 0.0)
         }),
+        ("attention", &[2, 3, 3], &[3, 3], |t, _, b| {
+            let x = t.constant(ArrayD::zeros(IxDyn(&[6, 4])));
+            let whole = HeadColumns { value: x, start: 0 };
+            let shape = AttentionShape {
+                heads: 2,
+                width: 4,
+                queries: 3,
+                keys: 3,
+            };
+            t.attention([whole; 3], shape, Some(b), 0.0)
+        }),
     ];
     for (name, left, right, build) in cases {
         let message = refusal(left, right, build);
@@ -84,7 +95,7 @@ fn arguments_that_do_not_fit_a_shape_are_named_with_both() {
                 queries: 3,
                 keys: 3,
             };
-            t.attention(whole, whole, whole, shape, 0.0)
+            t.attention([whole; 3], shape, None, 0.0)
         }),
     ];
     for (name, shape, argument, build) in cases {

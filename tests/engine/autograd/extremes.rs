@@ -78,7 +78,7 @@ fn attention_stays_finite_for_large_scores() {
             queries: 3,
             keys: 3,
         };
-        tape.attention(q, k, w, shape, 0.0)
+        tape.attention([q, k, w], shape, None, 0.0)
     });
     assert_eq!(y[..4], [1.0, 2.0, 3.0, 4.0]);
     assert!(
@@ -89,6 +89,39 @@ fn attention_stays_finite_for_large_scores() {
         gradients.iter().flatten().all(|x| x.is_finite()),
         "{gradients:?}"
     );
+}
+
+/// Attention of two tokens to `keys` keys on one head of two numbers.
+fn attend(keys: usize, bias: Option<&[f64]>) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let numbers = |n: usize| -> Vec<f64> { (0..n).map(|i| (i as f64 * 1.3).sin()).collect() };
+    let mut inputs = vec![
+        array::<f64>(&[2, 2], &numbers(4)),
+        array(&[keys, 2], &numbers(2 * keys)),
+    ];
+    inputs.extend(bias.map(|bias| array(&[1, 2, keys], bias)));
+    run(inputs, |tape, v| {
+        let columns = |value| HeadColumns { value, start: 0 };
+        let shape = AttentionShape {
+            heads: 1,
+            width: 2,
+            queries: 2,
+            keys,
+        };
+        let operands = [columns(v[0]), columns(v[1]), columns(v[1])];
+        tape.attention(operands, shape, v.get(2).copied(), 0.0)
+    })
+}
+
+#[test]
+fn a_key_with_a_bias_of_negative_infinity_is_as_if_it_were_not_there() {
+    let masked = f64::NEG_INFINITY;
+    let (y, gradients) = attend(4, Some(&[0.0, 0.0, 0.0, masked, 0.0, 0.0, 0.0, masked]));
+    let (expected, without) = attend(3, None);
+    assert_eq!(y, expected);
+    assert_eq!(gradients[0], without[0]);
+    assert_eq!(gradients[1][..6], without[1]);
+    assert_eq!(gradients[1][6..], [0.0, 0.0]);
+    assert_eq!((gradients[2][3], gradients[2][7]), (0.0, 0.0));
 }
 
 fn gates_hold<T: Real>(tolerance: f64) {

@@ -146,7 +146,11 @@ impl Pair for Linear {
         if self.bias {
             y = tape.add(y, v[2])?;
         }
-        Ok(if self.relu { tape.relu(y) } else { y })
+        Ok(if self.relu {
+            tape.clamp(y, 0.0, f64::INFINITY)
+        } else {
+            y
+        })
     }
 }
 
@@ -222,13 +226,16 @@ fn lstm_cell_is_its_gates_written_out() {
     agree_in_both(&Lstm, false);
 }
 
-/// Queries in one value, keys and values beside each other in another.
+/// Queries in one value, keys and values beside each other in another, a bias of the scores in a
+/// third.
 struct Attention {
     windows: usize,
     heads: usize,
     head_width: usize,
     queries: usize,
     keys: usize,
+    /// Heads of the bias, if there is one.
+    biases: Option<usize>,
     dropout: f64,
 }
 
@@ -241,14 +248,23 @@ impl Attention {
         HeadColumns { value, start }
     }
 
-    /// q_h k_h^T / sqrt(dh), softmax, for one window and head, `[queries, keys]`.
-    fn probabilities<T: Real>(&self, tape: &mut Tape<'_, T>, (q, k): (Var, Var)) -> Result<Var> {
+    /// q_h k_h^T / sqrt(dh), plus the bias, softmax, for one window and head, `[queries, keys]`.
+    fn probabilities<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        (q, k): (Var, Var),
+        bias: Option<Var>,
+    ) -> Result<Var> {
         let (dh, tq, tk) = (self.head_width, self.queries, self.keys);
         let q = tape.reshape(q, &[tq, 1, dh])?;
         let k = tape.reshape(k, &[1, tk, dh])?;
         let products = tape.mul(q, k)?;
         let scores = tape.sum_last(products)?;
-        let scores = tape.affine(scores, 1.0 / (dh as f64).sqrt(), 0.0);
+        let mut scores = tape.affine(scores, 1.0 / (dh as f64).sqrt(), 0.0);
+        if let Some(bias) = bias {
+            let bias = tape.reshape(bias, &[tq, tk])?;
+            scores = tape.add(scores, bias)?;
+        }
         Ok(tape.softmax(scores))
     }
 }
@@ -259,6 +275,7 @@ impl Pair for Attention {
         vec![
             vec![self.windows * self.queries, width],
             vec![self.windows * self.keys, 2 * width],
+            vec![self.biases.unwrap_or(1), self.queries, self.keys],
         ]
     }
 
@@ -274,7 +291,8 @@ impl Pair for Attention {
             Self::columns(v[1], 0),
             Self::columns(v[1], self.width()),
         );
-        tape.attention(q, k, w, shape, self.dropout)
+        let bias = self.biases.map(|_| v[2]);
+        tape.attention([q, k, w], shape, bias, self.dropout)
     }
 
     fn composed<T: Real>(
@@ -296,7 +314,11 @@ impl Pair for Attention {
                 let q = tape.columns(q, of_head(0))?;
                 let k = tape.columns(kv, of_head(0))?;
                 values.push(tape.columns(kv, of_head(width))?);
-                let p = self.probabilities(tape, (q, k))?;
+                let bias = match self.biases {
+                    None => None,
+                    Some(heads) => Some(tape.rows(v[2], head % heads..head % heads + 1)?),
+                };
+                let p = self.probabilities(tape, (q, k), bias)?;
                 all.push(tape.concat(&[p, padding])?);
             }
         }
@@ -322,9 +344,12 @@ impl Pair for Attention {
 
 #[test]
 fn attention_is_softmax_and_products_in_each_window_and_head() {
-    for (windows, heads, head_width, queries, keys) in
-        [(1, 1, 1, 1, 1), (3, 2, 3, 7, 7), (2, 3, 4, 2, 9)]
-    {
+    for (windows, heads, head_width, queries, keys, biases) in [
+        (1, 1, 1, 1, 1, None),
+        (3, 2, 3, 7, 7, None),
+        (3, 2, 3, 7, 7, Some(1)),
+        (2, 3, 4, 2, 9, Some(3)),
+    ] {
         for dropout in [0.0, 0.4] {
             let pair = Attention {
                 windows,
@@ -332,6 +357,7 @@ fn attention_is_softmax_and_products_in_each_window_and_head() {
                 head_width,
                 queries,
                 keys,
+                biases,
                 dropout,
             };
             agree_in_both(&pair, dropout > 0.0);
@@ -392,7 +418,8 @@ impl Pair for QueryAttention {
             keys: self.tokens,
         };
         masks.set(tape.mark());
-        tape.attention(whole(v[0]), whole(k), whole(w), shape, self.dropout)
+        let operands = [whole(v[0]), whole(k), whole(w)];
+        tape.attention(operands, shape, None, self.dropout)
     }
 }
 
@@ -487,7 +514,7 @@ impl Pair for Prelu {
     }
 
     fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
-        let positive = tape.relu(v[0]);
+        let positive = tape.clamp(v[0], 0.0, f64::INFINITY);
         let negative = tape.sub(v[0], positive)?;
         let negative = tape.mul(negative, v[1])?;
         tape.add(positive, negative)

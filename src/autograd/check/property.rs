@@ -1,0 +1,202 @@
+//! The property that every operation's file states: its gradient is that of central differences.
+
+use std::fmt;
+use std::sync::Arc;
+
+use ndarray::{ArrayD, IxDyn};
+use proptest::prelude::*;
+use proptest::strategy::BoxedStrategy;
+use proptest::test_runner::{Config, TestRunner};
+use rand::{RngExt, SeedableRng};
+
+use super::super::{AutogradError, Gradients, Parameters, Tape, Var, Workspace};
+use super::compare;
+
+pub type Build = Arc<dyn Fn(&mut Tape<f64>, &[Var]) -> Result<Var, AutogradError> + Send + Sync>;
+
+/// An operation applied to drawn inputs.
+#[derive(Clone)]
+pub struct Case {
+    pub inputs: Vec<ArrayD<f64>>,
+    pub build: Build,
+    /// Seed of the upstream gradient.
+    pub seed: u64,
+}
+
+/// Where an operation's cases are drawn from.
+pub type Cases = BoxedStrategy<Case>;
+
+impl fmt::Debug for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "seed {} inputs {:?}", self.seed, self.inputs)
+    }
+}
+
+/// A case whose inputs have the given shapes, with numbers between -2 and 2 that keep `margin`
+/// from 0 (for kinks there).
+pub fn case(
+    shapes: &[&[usize]],
+    seed: u64,
+    margin: f64,
+    build: impl Fn(&mut Tape<f64>, &[Var]) -> Result<Var, AutogradError> + Send + Sync + 'static,
+) -> Case {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let inputs = shapes
+        .iter()
+        .map(|shape| {
+            ArrayD::from_shape_simple_fn(IxDyn(shape), || {
+                let x: f64 = rng.random_range(-2.0..2.0);
+                x + margin * x.signum()
+            })
+        })
+        .collect();
+    Case {
+        inputs,
+        build: Arc::new(build),
+        seed,
+    }
+}
+
+fn upstream(len: usize, seed: u64) -> Vec<f64> {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0xfeed);
+    (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
+}
+
+/// Runs at least 200 drawn cases (`PROPTEST_CASES` for more), each with its inputs as values
+/// and as parameters.
+pub fn check(name: &str, cases: Cases) {
+    let config = Config::default();
+    let mut runner = TestRunner::new(Config {
+        cases: config.cases.max(200),
+        failure_persistence: None,
+        ..config
+    });
+    if let Err(error) = runner.run(&cases, |case| check_case(&case)) {
+        panic!("{name}: {error}");
+    }
+}
+
+fn scalar(case: &Case, inputs: &[ArrayD<f64>]) -> f64 {
+    let parameters = Parameters::new();
+    let mut workspace = Workspace::new();
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    let vars: Vec<Var> = inputs.iter().map(|x| tape.constant(x.clone())).collect();
+    let y = (case.build)(&mut tape, &vars).expect("the case is valid");
+    let values = tape.values(y);
+    let weights = upstream(values.len(), case.seed);
+    values.iter().zip(&weights).map(|(a, b)| a * b).sum()
+}
+
+pub(super) fn check_case(case: &Case) -> Result<(), TestCaseError> {
+    let as_values = gradients_of_values(case);
+    let as_parameters = gradients_of_parameters(case);
+    let centre = scalar(case, &case.inputs);
+    for (i, input) in case.inputs.iter().enumerate() {
+        for k in 0..input.len() {
+            let mut at = |offset: f64| {
+                let mut inputs = case.inputs.clone();
+                inputs[i].as_slice_mut().expect("contiguous")[k] += offset;
+                Ok(scalar(case, &inputs))
+            };
+            for (how, analytic) in [
+                ("value", as_values[i][k]),
+                ("parameter", as_parameters[i][k]),
+            ] {
+                let found = compare(analytic, 1.0, centre, &mut at).expect("the case is valid");
+                // None at a kink: the gradient is that of one side.
+                let agrees = found.as_ref().is_none_or(|found| found.error <= 2e-7);
+                prop_assert!(agrees, "input {i} as {how}, number {k}: {found:?}");
+            }
+        }
+    }
+    Ok(())
+}
+
+fn gradients_of_values(case: &Case) -> Vec<Vec<f64>> {
+    let parameters = Parameters::new();
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    let vars: Vec<Var> = case.inputs.iter().map(|x| tape.input(x.clone())).collect();
+    let y = (case.build)(&mut tape, &vars).expect("the case is valid");
+    let weights = upstream(tape.values(y).len(), case.seed);
+    tape.backward_from(y, &weights, &vars, &mut gradients)
+        .expect("finite")
+        .into_iter()
+        .map(|g| g.into_raw_vec_and_offset().0)
+        .collect()
+}
+
+fn gradients_of_parameters(case: &Case) -> Vec<Vec<f64>> {
+    let mut parameters = Parameters::new();
+    let blocks: Vec<_> = case
+        .inputs
+        .iter()
+        .enumerate()
+        .map(|(i, x)| parameters.add(format!("input {i}"), x.clone()).1)
+        .collect();
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    let vars: Vec<Var> = blocks.iter().map(|&b| tape.block(b)).collect();
+    let y = (case.build)(&mut tape, &vars).expect("the case is valid");
+    let weights = upstream(tape.values(y).len(), case.seed);
+    tape.backward_from(y, &weights, &[], &mut gradients)
+        .expect("finite");
+    gradients.iter().map(<[f64]>::to_vec).collect()
+}
+
+/// Cases of an operation on one value, whose numbers keep `margin` from 0.
+pub fn of_one_value<F>(margin: f64, build: F) -> Cases
+where
+    F: Fn(&mut Tape<f64>, Var) -> Result<Var, AutogradError> + Copy + Send + Sync + 'static,
+{
+    (shapes(), any::<u64>())
+        .prop_map(move |(x, seed)| case(&[&x], seed, margin, move |tape, v| build(tape, v[0])))
+        .boxed()
+}
+
+/// Cases of an operation on two values that broadcast together.
+pub fn of_two_values<F>(build: F) -> Cases
+where
+    F: Fn(&mut Tape<f64>, Var, Var) -> Result<Var, AutogradError> + Copy + Send + Sync + 'static,
+{
+    (broadcast_shapes(), any::<u64>())
+        .prop_map(move |((a, b), seed)| {
+            case(&[&a, &b], seed, 0.0, move |tape, v| build(tape, v[0], v[1]))
+        })
+        .boxed()
+}
+
+/// Two shapes that broadcast together (numpy's rules), of up to three axes of up to three, zero
+/// among them.
+fn broadcast_shapes() -> BoxedStrategy<(Vec<usize>, Vec<usize>)> {
+    (
+        prop::collection::vec(0usize..4, 0..4),
+        any::<[bool; 6]>(),
+        0usize..4,
+        0usize..4,
+    )
+        .prop_map(|(shape, ones, cut_a, cut_b)| {
+            let shrink = |from: usize, cut: usize| -> Vec<usize> {
+                shape
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &n)| if ones[from + i] { 1 } else { n })
+                    .skip(cut.min(shape.len()))
+                    .collect()
+            };
+            (shrink(0, cut_a), shrink(3, cut_b))
+        })
+        .boxed()
+}
+
+/// A factor on what saturates a function: mild or strong.
+pub fn strength() -> BoxedStrategy<f64> {
+    prop_oneof![Just(1.0), Just(30.0)].boxed()
+}
+
+/// A shape of one to three axes, zero-size ones among them.
+pub fn shapes() -> BoxedStrategy<Vec<usize>> {
+    prop::collection::vec(0usize..5, 1..4).boxed()
+}

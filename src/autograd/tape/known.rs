@@ -1,0 +1,81 @@
+//! The values on a tape as an operation reads them, on its way forth and back.
+
+use ndarray::{ArrayViewD, IxDyn};
+
+use super::{Node, Value, Var};
+use crate::autograd::kernels::{Mat, MatMut, Real, product, product_bt, product_packed};
+use crate::autograd::parameters::Parameters;
+
+/// What is on a tape so far, for reading.
+pub(in crate::autograd) struct Known<'s, T: Real> {
+    pub(super) nodes: &'s [Node<T>],
+    pub(super) parameters: &'s Parameters<T>,
+}
+
+impl<T: Real> Clone for Known<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: Real> Copy for Known<'_, T> {}
+
+impl<'s, T: Real> Known<'s, T> {
+    pub(super) fn shape(self, var: Var) -> &'s [usize] {
+        match &self.nodes[var.index()].value {
+            Value::Array(array) => array.shape(),
+            Value::Block(id) => self.parameters.block_shape(*id),
+            Value::Released => &[],
+        }
+    }
+
+    pub(super) fn values(self, var: Var) -> &'s [T] {
+        match &self.nodes[var.index()].value {
+            // Every array on the tape is in standard layout.
+            Value::Array(array) => array.as_slice().unwrap_or(&[]),
+            Value::Block(id) => self.parameters.block_values(*id),
+            Value::Released => &[],
+        }
+    }
+
+    pub(super) fn array(self, var: Var) -> ArrayViewD<'s, T> {
+        ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
+            .expect("a value has as many numbers as its shape says")
+    }
+
+    /// A weight `[out, in]` as a matrix.
+    fn matrix(self, weight: Var) -> Mat<'s, T> {
+        let shape = self.shape(weight);
+        Mat::new(self.values(weight), shape[0], shape[1])
+    }
+
+    /// out (+)= x W for a weight W `[out, in]`, packed where it is a parameter.
+    pub(in crate::autograd) fn product(
+        self,
+        x: Mat<'_, T>,
+        weight: Var,
+        out: MatMut<'_, T>,
+        accumulate: bool,
+    ) {
+        match self.nodes[weight.index()].value {
+            Value::Block(id) => product_packed(x, self.parameters.packed(id), out, accumulate),
+            _ => product(x, self.matrix(weight), out, accumulate),
+        }
+    }
+
+    /// out (+)= x W^T for a weight W `[out, in]`, packed where it is a parameter.
+    pub(in crate::autograd) fn product_transposed(
+        self,
+        x: Mat<'_, T>,
+        weight: Var,
+        out: MatMut<'_, T>,
+        accumulate: bool,
+    ) {
+        match self.nodes[weight.index()].value {
+            Value::Block(id) => {
+                product_packed(x, self.parameters.packed_transposed(id), out, accumulate);
+            }
+            _ => product_bt(x, self.matrix(weight), out, accumulate),
+        }
+    }
+}
