@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 
-use super::evaluation_record::EvaluationRecord;
-use super::tables::thousands;
+use crate::evaluation::EvaluationRecord;
 use crate::experiment::ExperimentConfig;
+use crate::report::thousands;
 use crate::run::{RunFolder, RunProgress, RunStatus};
 use crate::training::TrainingError;
 
@@ -119,9 +119,7 @@ impl Row {
         }
         match EvaluationRecord::read(folder) {
             Ok(record) => row.score(&record),
-            Err(error) if EvaluationRecord::is_in(folder) => {
-                row.problems.push(format!("{error:#}"))
-            }
+            Err(error) if EvaluationRecord::is_in(folder) => row.problems.push(error.to_string()),
             Err(_) => {}
         }
         row

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::evaluation_record::{EvaluatedData, EvaluationRecord};
-use crate::evaluation::{TableRow, markdown_tables};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, TableRow, markdown_tables};
 use crate::experiment::ExperimentConfig;
 use crate::optim::{AdamConfig, RateShape};
+use crate::report::thousands;
 use crate::run::{Manifest, RunFolder, RunState, replace_file};
 
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let rows: Vec<TableRow> = runs.iter().map(Evaluated::row).collect();
     let subject = runs
         .first()
-        .map_or_else(String::new, |run| subject(&run.record.data));
+        .map_or_else(String::new, |run| run.record.data.caption());
     replace_file(&args.out, markdown_tables(&rows, &subject).as_bytes())?;
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(())
@@ -122,16 +122,6 @@ fn learning_rate(optimiser: &AdamConfig) -> String {
     text + &format!(", falling {shape} to {}", rate * schedule.final_share)
 }
 
-/// What the scores were measured on, for a caption.
-pub fn subject(data: &EvaluatedData) -> String {
-    format!(
-        "{} test clips, {} frames, of the data with digest {}",
-        data.clips,
-        thousands(data.frames as u64),
-        data.data_digest
-    )
-}
-
 /// Scores stand side by side only if they were measured on the same windows.
 fn same_data(runs: &[Evaluated]) -> anyhow::Result<()> {
     for pair in runs.windows(2) {
@@ -170,28 +160,4 @@ fn same_data(runs: &[Evaluated]) -> anyhow::Result<()> {
         }
     }
     Ok(())
-}
-
-/// 1234567 as "1,234,567".
-pub fn thousands(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thousands_are_parted_from_the_right() {
-        let texts = [0, 999, 1000, 123_456, 1_234_567].map(thousands);
-        assert_eq!(texts, ["0", "999", "1,000", "123,456", "1,234,567"]);
-    }
 }

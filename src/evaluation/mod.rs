@@ -4,6 +4,7 @@ pub mod effect;
 pub mod metrics;
 pub mod paper;
 pub mod protocol;
+mod record;
 pub mod scores;
 pub mod tables;
 pub mod window_request;
@@ -13,6 +14,7 @@ pub use effect::{
 };
 pub use metrics::{WindowScores, window_scores};
 pub use protocol::{EvaluationError, Outcome, Protocol, SkippedClip};
+pub use record::{EvaluatedData, EvaluationRecord, RecordError};
 pub use scores::{Evaluation, LengthScores};
 pub use tables::{TableRow, markdown_tables, terminal_tables};
 pub use window_request::window_request;

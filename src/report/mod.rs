@@ -10,6 +10,7 @@ pub mod lrp_curve;
 pub mod motion_figure;
 pub mod root_panel;
 pub mod svg;
+mod thousands;
 pub mod validation_curve;
 pub mod viewer;
 
@@ -17,6 +18,7 @@ pub use loss_curve::{LossSeries, loss_curve};
 pub use lrp_curve::{LrpSeries, lrp_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};
+pub use thousands::thousands;
 pub use validation_curve::{ValidationSeries, validation_curve};
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 

@@ -3,16 +3,20 @@
 pub mod checkpoint;
 pub(crate) mod durable;
 pub(crate) mod folder;
+mod json;
 mod lock;
 pub(crate) mod log;
 pub mod manifest;
 pub mod state;
 mod status;
+mod subject;
 mod trained_model;
 
 pub use durable::FileError;
 pub(crate) use durable::replace as replace_file;
 pub use folder::RunFolder;
+pub(crate) use json::write_json;
 pub use log::LogLine;
 pub use manifest::{Manifest, RunState};
 pub use status::{RunProgress, RunStatus};
+pub use subject::{Subject, SubjectError};

@@ -14,18 +14,18 @@ use std::time::Instant;
 use anyhow::Context as _;
 use clap::Args;
 
-use super::clip_choice::ClipChoice;
-use super::evaluation_record::{EvaluatedData, EvaluationRecord, write_json};
 use super::notice::notice;
-use super::tables::{schedule_note, thousands};
+use super::tables::schedule_note;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::choreography::{ChoreographyConfig, generate};
-use crate::data::{DanceClip, Dataset};
+use crate::data::{DanceClip, DataPart, Dataset};
+use crate::evaluation::{EvaluatedData, EvaluationRecord};
 use crate::evaluation::{Evaluation, Protocol, TableRow, markdown_tables, terminal_tables};
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::TransitionModel;
-use crate::run::{RunFolder, replace_file};
+use crate::report::thousands;
+use crate::run::{RunFolder, replace_file, write_json};
 use comparison::Comparison;
 use settings::Settings;
 use showcase::{Showcase, ShowcaseFiles};
@@ -137,7 +137,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     write_json(&run.path().join(UNTRAINED), &comparison.untrained)?;
     EvaluationRecord {
         evaluation: comparison.model.clone(),
-        data: EvaluatedData::of(&dataset, ClipChoice::Test)?,
+        data: EvaluatedData::of(&dataset, DataPart::Test)?,
     }
     .write(run.path())?;
     write_text(
@@ -210,7 +210,7 @@ fn remove_results(folder: &Path) -> anyhow::Result<()> {
     ];
     let names = own
         .into_iter()
-        .chain(EvaluationRecord::files(ClipChoice::Test));
+        .chain(EvaluationRecord::files(DataPart::Test));
     for path in names.map(|name| folder.join(name)) {
         if path.exists() {
             fs::remove_file(&path)

@@ -4,10 +4,10 @@ use std::io::Write as _;
 use std::ops::ControlFlow;
 
 use crate::cli::progress::Progress;
-use crate::cli::tables::thousands;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::models::transition::TrainedModel;
+use crate::report::thousands;
 use crate::report::{FigureError, LossSeries, loss_curve};
 use crate::run::RunFolder;
 use crate::training::{StepReport, Trainer};

@@ -14,14 +14,14 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
-use super::subject::Subject;
 use super::threads::Threads;
 use super::viewer_page::{Shown, viewer_page};
 use crate::data::Dataset;
+use crate::models::ModelConfig;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::TransitionModel;
 use crate::report::MotionKind;
-use crate::run::replace_file;
+use crate::run::{Subject, replace_file};
 use crate::synthesis::{SynthesisOptions, synthesise};
 use comparison::Entry;
 use output::{Figure, index};
@@ -161,7 +161,7 @@ impl Cast {
     fn models(&self) -> Vec<(&str, bool, &dyn TransitionModel)> {
         let given = || self.compared.iter().chain([&self.subject]);
         let mut models: Vec<(&str, bool, &dyn TransitionModel)> = Vec::new();
-        if !given().any(Subject::is_interpolation) {
+        if !given().any(|subject| matches!(subject.config.model, ModelConfig::Interpolation(_))) {
             models.push(("Interpolation", false, &self.interpolation));
         }
         models.extend(given().map(|subject| {

@@ -13,15 +13,14 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
-use super::evaluation_record::write_json;
 use super::notice::notice;
-use super::subject::Subject;
 use super::viewer_page::{Shown, viewer_page};
+use crate::models::ModelConfig;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use crate::report::MotionKind;
-use crate::run::replace_file;
+use crate::run::{Subject, replace_file, write_json};
 use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, control_warnings, synthesise};
 use keyframes::{KeyframeArgs, Keyframes};
 use summary::Summary;
@@ -107,7 +106,7 @@ fn page(
         contact_threshold: subject.config.data.contact_threshold,
     };
     let name = "Interpolation";
-    let interpolated = match subject.is_interpolation() {
+    let interpolated = match matches!(subject.config.model, ModelConfig::Interpolation(_)) {
         false => Some(synthesise(&interpolation, request, options, name)?),
         true => None,
     };

@@ -16,14 +16,13 @@ use clap::Args;
 use self::report::Reported;
 use self::results::RowResults;
 use self::rows::{Row, Seeds};
-use super::clip_choice::ClipChoice;
 use super::notice::notice;
 use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use super::train;
 use super::watched::evaluate_watched;
-use crate::data::Dataset;
+use crate::data::{DataPart, Dataset};
 use crate::evaluation::{Evaluation, Protocol};
 use crate::models::transition::TransitionModel;
 use crate::run::{RunFolder, RunState};
@@ -98,7 +97,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         ),
     };
     let dataset = dataset(&rows, &args.data)?;
-    ClipChoice::Test.of(&dataset)?;
+    DataPart::Test.of(&dataset)?;
     let workshop = Workshop {
         dataset: &dataset,
         out: &args.out,

@@ -9,13 +9,11 @@ use sha2::{Digest as _, Sha256};
 
 use super::results::{RowResults, table_row};
 use super::rows::Row;
-use crate::cli::evaluation_record::{EvaluationRecord, write_json};
-use crate::cli::tables::subject;
 use crate::data::hexadecimal;
 use crate::evaluation::paper::{self, PaperRow};
-use crate::evaluation::{TableRow, markdown_tables};
+use crate::evaluation::{EvaluationRecord, TableRow, markdown_tables};
 use crate::report::{LrpSeries, lrp_curve};
-use crate::run::{RunFolder, replace_file};
+use crate::run::{RunFolder, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const FIGURE: &str = "lrp.svg";
@@ -79,7 +77,7 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Re
     let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {
         return Ok(());
     };
-    let tables = markdown_tables(&table_rows, &subject(&record.data));
+    let tables = markdown_tables(&table_rows, &record.data.caption());
     replace_file(&out.join(TABLES), tables.as_bytes())?;
     let title = "LRP on the test clips; dashed: the paper's";
     replace_file(
@@ -99,7 +97,7 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Re
             .collect::<anyhow::Result<_>>()?,
         files: digests(out, &files)?,
     };
-    write_json(&out.join(MANIFEST), &manifest)
+    Ok(write_json(&out.join(MANIFEST), &manifest)?)
 }
 
 fn manifest_row<'r>(

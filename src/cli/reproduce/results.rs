@@ -5,12 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 
 use super::rows::Row;
-use crate::cli::clip_choice::ClipChoice;
-use crate::cli::evaluation_record::{EvaluatedData, EvaluationRecord};
-use crate::cli::tables::{NO_TRAINING, schedule_note, thousands};
-use crate::data::Dataset;
-use crate::evaluation::{Evaluation, TableRow};
-use crate::report::{LossSeries, ValidationSeries, loss_curve, validation_curve};
+use crate::cli::tables::{NO_TRAINING, schedule_note};
+use crate::data::{DataPart, Dataset};
+use crate::evaluation::{EvaluatedData, Evaluation, EvaluationRecord, TableRow};
+use crate::report::{LossSeries, ValidationSeries, loss_curve, thousands, validation_curve};
 use crate::run::{LogLine, Manifest, RunFolder, RunState, replace_file};
 
 const LOSS_CURVE: &str = "loss_curve.svg";
@@ -46,7 +44,7 @@ impl RowResults {
                 differences.join("; ")
             );
         }
-        let [scores, _] = EvaluationRecord::files(ClipChoice::Test);
+        let [scores, _] = EvaluationRecord::files(DataPart::Test);
         if !path.join(scores).exists() {
             return Ok(None);
         }
@@ -93,8 +91,8 @@ impl RowResults {
             )?;
             self.write_curves(row, &run.log()?)?;
         }
-        let data = EvaluatedData::of(dataset, ClipChoice::Test)?;
-        EvaluationRecord { evaluation, data }.write(path)
+        let data = EvaluatedData::of(dataset, DataPart::Test)?;
+        Ok(EvaluationRecord { evaluation, data }.write(path)?)
     }
 
     fn write_curves(&self, row: &Row, log: &[LogLine]) -> anyhow::Result<()> {
@@ -149,7 +147,7 @@ impl RowResults {
 
     /// Files that are there, by their names.
     pub fn files(&self) -> Vec<PathBuf> {
-        let [scores, data] = EvaluationRecord::files(ClipChoice::Test);
+        let [scores, data] = EvaluationRecord::files(DataPart::Test);
         let own =
             [scores, data, LOSS_CURVE, VALIDATION_CURVE].map(|name| self.folder.path().join(name));
         [self.folder.config_path(), self.folder.manifest_path()]

@@ -3,14 +3,42 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::clip_choice::ClipChoice;
-use crate::data::{DanceClip, Dataset};
-use crate::evaluation::Evaluation;
-use crate::run::replace_file;
+use super::scores::Evaluation;
+use crate::data::{DanceClip, DataPart, Dataset, EmptyPart};
+use crate::report::thousands;
+use crate::run::{FileError, write_json};
+
+/// Why a folder's scores cannot be read; each says how to get some.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    #[error("{} has no {name}; to get one, {}", folder.display(), remedy(folder))]
+    Missing { folder: PathBuf, name: &'static str },
+    #[error(
+        "{} holds no scores on test clips; to get some, {}: {cause}",
+        folder.join(name).display(),
+        remedy(folder)
+    )]
+    Damaged {
+        folder: PathBuf,
+        name: &'static str,
+        cause: serde_json::Error,
+    },
+    #[error(
+        "{} are scores on {part} clips, not on the test clips; to get those, {}",
+        folder.join(name).display(),
+        remedy(folder)
+    )]
+    OtherPart {
+        folder: PathBuf,
+        name: &'static str,
+        part: DataPart,
+    },
+    #[error(transparent)]
+    File(#[from] FileError),
+}
 
 /// What a model was evaluated on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,7 +46,7 @@ use crate::run::replace_file;
 pub struct EvaluatedData {
     /// Which part of the data set.
     #[serde(default)]
-    pub part: ClipChoice,
+    pub part: DataPart,
     #[serde(alias = "test_clips")]
     pub clips: usize,
     #[serde(alias = "test_frames")]
@@ -33,7 +61,7 @@ pub struct EvaluatedData {
 impl EvaluatedData {
     /// # Errors
     /// The data set has no such clips.
-    pub fn of(dataset: &Dataset, part: ClipChoice) -> anyhow::Result<Self> {
+    pub fn of(dataset: &Dataset, part: DataPart) -> Result<Self, EmptyPart> {
         let clips = part.of(dataset)?;
         Ok(Self {
             part,
@@ -43,6 +71,16 @@ impl EvaluatedData {
             version: env!("CARGO_PKG_VERSION").into(),
             commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
         })
+    }
+
+    /// What the scores were measured on, for a caption.
+    pub fn caption(&self) -> String {
+        format!(
+            "{} test clips, {} frames, of the data with digest {}",
+            self.clips,
+            thousands(self.frames as u64),
+            self.data_digest
+        )
     }
 }
 
@@ -56,22 +94,22 @@ pub struct EvaluationRecord {
 /// The JSON of scores. Those on the test clips are no more than the scores.
 #[derive(Serialize)]
 struct Scores<'a> {
-    #[serde(skip_serializing_if = "ClipChoice::is_test")]
-    clips: ClipChoice,
+    #[serde(skip_serializing_if = "DataPart::is_test")]
+    clips: DataPart,
     #[serde(flatten)]
     evaluation: &'a Evaluation,
 }
 
 impl EvaluationRecord {
     /// Names of the files: scores, and what they were measured on.
-    pub fn files(part: ClipChoice) -> [&'static str; 2] {
+    pub fn files(part: DataPart) -> [&'static str; 2] {
         match part {
-            ClipChoice::Test => ["evaluation.json", "evaluation_data.json"],
-            ClipChoice::Validation => [
+            DataPart::Test => ["evaluation.json", "evaluation_data.json"],
+            DataPart::Validation => [
                 "evaluation_validation.json",
                 "evaluation_validation_data.json",
             ],
-            ClipChoice::Train => ["evaluation_train.json", "evaluation_train_data.json"],
+            DataPart::Train => ["evaluation_train.json", "evaluation_train_data.json"],
         }
     }
 
@@ -79,7 +117,7 @@ impl EvaluationRecord {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_scores(&self, path: &Path) -> anyhow::Result<()> {
+    pub fn write_scores(&self, path: &Path) -> Result<(), FileError> {
         let scores = Scores {
             clips: self.data.part,
             evaluation: &self.evaluation,
@@ -89,7 +127,7 @@ impl EvaluationRecord {
 
     /// Whether a folder has scores on the test clips, sound or not.
     pub fn is_in(folder: &Path) -> bool {
-        let [scores, _] = Self::files(ClipChoice::Test);
+        let [scores, _] = Self::files(DataPart::Test);
         folder.join(scores).exists()
     }
 
@@ -97,7 +135,7 @@ impl EvaluationRecord {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
+    pub fn write(&self, folder: &Path) -> Result<(), FileError> {
         let [scores, data] = Self::files(self.data.part);
         write_json(&folder.join(data), &self.data)?;
         self.write_scores(&folder.join(scores))
@@ -107,52 +145,36 @@ impl EvaluationRecord {
     ///
     /// # Errors
     /// The folder has no such scores (the error says how to get them), or a file is damaged.
-    pub fn read(folder: &Path) -> anyhow::Result<Self> {
-        let [scores, data] = Self::files(ClipChoice::Test);
+    pub fn read(folder: &Path) -> Result<Self, RecordError> {
+        let [scores, data] = Self::files(DataPart::Test);
         let record = Self {
             evaluation: read_json(folder, scores)?,
             data: read_json(folder, data)?,
         };
         if !record.data.part.is_test() {
-            anyhow::bail!(
-                "{} are scores on {} clips, not on the test clips; to get those, {}",
-                folder.join(scores).display(),
-                record.data.part,
-                remedy(folder)
-            );
+            return Err(RecordError::OtherPart {
+                folder: folder.into(),
+                name: scores,
+                part: record.data.part,
+            });
         }
         Ok(record)
     }
 }
 
-/// Writes JSON with a final line end.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_json(path: &Path, content: &impl Serialize) -> anyhow::Result<()> {
-    let mut text = serde_json::to_vec_pretty(content)
-        .with_context(|| format!("{} cannot be written", path.display()))?;
-    text.push(b'\n');
-    Ok(replace_file(path, &text)?)
-}
-
-fn read_json<T: DeserializeOwned>(folder: &Path, name: &str) -> anyhow::Result<T> {
-    let path: PathBuf = folder.join(name);
+fn read_json<T: DeserializeOwned>(folder: &Path, name: &'static str) -> Result<T, RecordError> {
+    let path = folder.join(name);
     if !path.exists() {
-        anyhow::bail!(
-            "{} has no {name}; to get one, {}",
-            folder.display(),
-            remedy(folder)
-        );
+        return Err(RecordError::Missing {
+            folder: folder.into(),
+            name,
+        });
     }
-    let text = std::fs::read_to_string(&path)
-        .with_context(|| format!("{} cannot be read", path.display()))?;
-    serde_json::from_str(&text).with_context(|| {
-        format!(
-            "{} holds no scores on test clips; to get some, {}",
-            path.display(),
-            remedy(folder)
-        )
+    let text = std::fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
+    serde_json::from_str(&text).map_err(|cause| RecordError::Damaged {
+        folder: folder.into(),
+        name,
+        cause,
     })
 }
 
