@@ -21,7 +21,6 @@ mod stop;
 mod tables;
 mod threads;
 mod train;
-mod viewer_page;
 mod watched;
 
 use std::io;

@@ -1,10 +1,11 @@
 //! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as HTML.
 //!
-//! A figure knows numbers and positions only, no model and no training.
+//! A figure knows numbers and positions only, no model and no training; the figures of a paper in [`figures`] ask models for them.
 
 pub mod camera;
 pub mod chart;
 mod dancer;
+pub mod figures;
 pub mod loss_curve;
 pub mod lrp_curve;
 pub mod motion_figure;

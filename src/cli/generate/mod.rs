@@ -14,12 +14,12 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::notice;
-use super::viewer_page::{Shown, viewer_page};
 use crate::models::ModelConfig;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
-use crate::report::MotionKind;
+use crate::report::viewer::RequestMotion;
+use crate::report::{MotionKind, Viewer};
 use crate::run::{Subject, replace_file, write_json};
 use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, control_warnings, synthesise};
 use keyframes::{KeyframeArgs, Keyframes};
@@ -112,25 +112,25 @@ fn page(
     };
     let mut shown = Vec::new();
     if let Some(frames) = keyframes.recorded(request) {
-        shown.push(Shown {
+        shown.push(RequestMotion {
             name: "Ground truth",
             kind: MotionKind::Recorded,
             frames,
         });
     }
     if let Some(interpolated) = &interpolated {
-        shown.push(Shown {
+        shown.push(RequestMotion {
             name,
             kind: MotionKind::Other,
             frames: interpolated.features.view(),
         });
     }
-    shown.push(Shown {
+    shown.push(RequestMotion {
         name: &subject.config.name,
         kind: MotionKind::Model,
         frames: sequence.features.view(),
     });
-    Ok(viewer_page(&sequence.clip.name, request, &shown)?)
+    Ok(Viewer::of_request(&sequence.clip.name, request, &shown).html()?)
 }
 
 /// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.

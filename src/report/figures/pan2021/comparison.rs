@@ -1,14 +1,12 @@
 //! Figures 11 and 12: several models on the same transition.
 
-use anyhow::Context as _;
-
-use super::output::{Figure, Numbers};
 use super::root::{root_distances, row_with_paths};
 use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
 use crate::evaluation::{WindowScores, window_scores};
 use crate::models::transition::Transition;
 use crate::motion::placement::world_positions;
+use crate::report::figures::{Figure, FiguresError, Numbers};
 use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
 use ndarray::s;
 
@@ -24,7 +22,7 @@ pub struct Entry {
 }
 
 /// Figure 11: motions and root trajectories of the models.
-pub fn figure_11(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
+pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let mut said = Vec::new();
@@ -61,7 +59,7 @@ pub fn figure_11(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
 }
 
 /// Figure 12: the recorded motion and every model's.
-pub fn figure_12(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
+pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
     let recorded = positions(stage.shown().recorded.view());
     let mut rows = vec![MotionRow::between_keyframes(
@@ -85,7 +83,10 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> anyhow::Result<Figure> {
                 window_scores(window.recorded.view(), &Transition { frames })
             })
             .collect::<Result<_, _>>()
-            .with_context(|| entry.name.clone())?;
+            .map_err(|source| FiguresError::Scores {
+                model: entry.name.clone(),
+                source,
+            })?;
         let of =
             |score: fn(&WindowScores) -> f64| mean(&scores.iter().map(score).collect::<Vec<_>>());
         let lrp = of(|scores| scores.body_position);

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::output::{Figure, Numbers};
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
 use crate::evaluation::{Protocol, Response, body_distance, root_response};
 use crate::models::transition::TransitionModel;
+use crate::report::figures::{Figure, FiguresError, Numbers};
 use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
 use crate::synthesis::{SequenceRequest, SynthesisError};
@@ -19,7 +19,7 @@ const HEIGHT: f64 = 30.0;
 const DETOUR: f64 = 60.0;
 
 /// Figure 5: generated motions and their root trajectories beside the targets. `plain`: the model under the clips' own controls.
-pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> anyhow::Result<Figure> {
+pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let pairs = stage.windows().iter().zip(plain);
@@ -77,7 +77,7 @@ pub fn figure_6(
     stage: &Stage,
     model: &dyn TransitionModel,
     plain: &[Generated],
-) -> anyhow::Result<Figure> {
+) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
     let lowered = stage.generate(model, |request| Ok(request.raised(-HEIGHT)))?;
     let raised = stage.generate(model, |request| Ok(request.raised(HEIGHT)))?;
@@ -125,7 +125,7 @@ pub fn figure_7(
     stage: &Stage,
     model: &dyn TransitionModel,
     plain: &[Generated],
-) -> anyhow::Result<Figure> {
+) -> Result<Figure, FiguresError> {
     let paths: [(&str, &[f64]); 3] = [
         ("to the left", &[1.0]),
         ("to the right", &[-1.0]),

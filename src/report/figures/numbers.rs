@@ -1,53 +1,8 @@
-//! What a figure leaves: an SVG with its caption, its numbers as CSV beside it.
+//! The numbers behind a figure.
 
-use std::path::Path;
-
-use anyhow::Context as _;
 use serde::Serialize;
 
 use crate::motion::{PART_NAMES, PARTS};
-use crate::report::MotionFigure;
-use crate::run::replace_file;
-
-/// A figure and the numbers behind it.
-pub struct Figure {
-    /// File name without extension, such as `figure_8`.
-    pub name: &'static str,
-    /// One line: what the figure shows and what was measured.
-    pub caption: String,
-    pub svg: String,
-    pub numbers: Numbers,
-}
-
-impl Figure {
-    /// A figure of dancers, with its caption.
-    ///
-    /// # Errors
-    /// There is nothing that could be drawn.
-    pub fn of_dancers(
-        name: &'static str,
-        drawing: MotionFigure,
-        numbers: Numbers,
-    ) -> anyhow::Result<Self> {
-        Ok(Self {
-            name,
-            svg: drawing.svg()?,
-            caption: drawing.caption,
-            numbers,
-        })
-    }
-
-    /// Writes the SVG and the CSV.
-    ///
-    /// # Errors
-    /// A file cannot be written.
-    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
-        let path = |extension: &str| folder.join(self.name).with_extension(extension);
-        replace_file(&path("svg"), self.svg.as_bytes())?;
-        replace_file(&path("csv"), &self.numbers.csv()?)?;
-        Ok(())
-    }
-}
 
 /// One number.
 #[derive(Debug, Clone, Serialize)]
@@ -131,22 +86,14 @@ impl Numbers {
         });
     }
 
-    fn csv(&self) -> anyhow::Result<Vec<u8>> {
+    /// The numbers as the content of a CSV file.
+    pub(super) fn csv(&self) -> Result<Vec<u8>, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for line in &self.lines {
             writer.serialize(line)?;
         }
-        writer.into_inner().context("the numbers of a figure")
+        Ok(writer
+            .into_inner()
+            .map_err(csv::IntoInnerError::into_error)?)
     }
-}
-
-/// The page that shows all figures with their captions, Markdown.
-pub fn index(figures: &[Figure], subject: &str) -> String {
-    let mut text = format!("# The paper's figures\n\n{subject}\n");
-    for Figure { name, caption, .. } in figures {
-        let caption = caption.replace('[', "(").replace(']', ")");
-        text +=
-            &format!("\n![{caption}]({name}.svg)\n\n{caption} Numbers: [{name}.csv]({name}.csv)\n");
-    }
-    text
 }

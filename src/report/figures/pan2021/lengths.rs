@@ -1,12 +1,12 @@
 //! Figure 10: the same keyframes with more and more frames between them.
 
-use super::output::{Figure, Numbers};
 use super::root::mean_body_distance;
 use super::stage::{Generated, Stage};
 use super::velocity::{asked_after, mean_parts};
 use super::wording::{mean, percent};
 use crate::evaluation::{FOLLOWED, mean_velocity_factors};
 use crate::models::transition::TransitionModel;
+use crate::report::figures::{Figure, FiguresError, Numbers};
 use crate::report::{MotionFigure, MotionRow, Shown};
 use ndarray::s;
 
@@ -16,7 +16,7 @@ const LENGTHS: [usize; 4] = [100, 150, 200, 250];
 const DANCERS: usize = 25;
 
 /// The trajectory is gone in more time, the velocity factors keep their values.
-pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> anyhow::Result<Figure> {
+pub fn figure_10(stage: &Stage, model: &dyn TransitionModel) -> Result<Figure, FiguresError> {
     let name = model.name();
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();

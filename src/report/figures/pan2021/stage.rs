@@ -1,8 +1,7 @@
 //! Which windows the figures show and measure, and what a model makes of them.
 
-use anyhow::Context as _;
 use glam::DVec3;
-use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
+use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
 use crate::data::DanceClip;
@@ -11,6 +10,7 @@ use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
+use crate::report::figures::FiguresError;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 /// Windows that a model predicts in one call.
@@ -51,7 +51,7 @@ impl<'d> Stage<'d> {
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
-    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> anyhow::Result<Self> {
+    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, FiguresError> {
         let needed = choice.length + 1;
         let mut fitting: Vec<&DanceClip> = clips
             .iter()
@@ -61,19 +61,21 @@ impl<'d> Stage<'d> {
         let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
         let first = match choice.clip {
             None => 0,
-            Some(name) => fitting.iter().position(|clip| clip.name == name).with_context(|| {
-                let names: Vec<&str> = fitting.iter().map(|clip| clip.name.as_str()).collect();
-                format!(
-                    "--clip {name} is not among the test clips with {needed} frames or more: {}",
-                    names.join(", ")
-                )
-            })?,
+            Some(name) => fitting
+                .iter()
+                .position(|clip| clip.name == name)
+                .ok_or_else(|| FiguresError::NoClip {
+                    name: name.into(),
+                    needed,
+                    clips: fitting.iter().map(|clip| clip.name.clone()).collect(),
+                })?,
         };
         if fitting.is_empty() {
-            anyhow::bail!(
-                "no test clip has the {needed} frames of --length {} (the longest has {longest})",
-                choice.length
-            );
+            return Err(FiguresError::TooShort {
+                length: choice.length,
+                needed,
+                longest,
+            });
         }
         fitting[..=first].rotate_right(1);
         let mut windows = Vec::with_capacity(fitting.len());
@@ -84,11 +86,13 @@ impl<'d> Stage<'d> {
                 _ => last / 2,
             };
             if start > last {
-                anyhow::bail!(
-                    "--start {start}: {} has {} frames, so a window of {needed} starts at frame {last} at the latest",
-                    clip.name,
-                    clip.frames()
-                );
+                return Err(FiguresError::Start {
+                    start,
+                    clip: clip.name.clone(),
+                    frames: clip.frames(),
+                    needed,
+                    last,
+                });
             }
             windows.push(Window {
                 clip,
@@ -131,7 +135,7 @@ impl<'d> Stage<'d> {
         &self,
         model: &dyn TransitionModel,
         change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
-    ) -> anyhow::Result<Vec<Generated>> {
+    ) -> Result<Vec<Generated>, FiguresError> {
         let requests: Vec<SequenceRequest> = self
             .windows
             .iter()
@@ -151,9 +155,10 @@ impl<'d> Stage<'d> {
             .zip(predicted)
             .map(|(request, predicted)| {
                 predicted.check(request.frames() - 1)?;
+                let mut frames = Array2::zeros((request.frames(), FRAME));
                 let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
-                let first = first.insert_axis(Axis(0));
-                let frames = concatenate(Axis(0), &[first, predicted.frames.view()])?;
+                frames.row_mut(0).assign(&first);
+                frames.slice_mut(s![1.., ..]).assign(&predicted.frames);
                 Ok(Generated { request, frames })
             });
         generated.collect()
