@@ -15,7 +15,6 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::notice;
-use super::tables::schedule_note;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::choreography::{ChoreographyConfig, generate};
@@ -24,7 +23,7 @@ use crate::evaluation::{EvaluatedData, EvaluationRecord};
 use crate::evaluation::{Evaluation, Protocol, TableRow, markdown_tables, terminal_tables};
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::TransitionModel;
-use crate::report::thousands;
+use crate::report::{schedule_note, thousands};
 use crate::run::{RunFolder, replace_file, write_json};
 use comparison::Comparison;
 use settings::Settings;

@@ -51,7 +51,7 @@ pub fn train(
         losses.add(report);
         ControlFlow::Continue(())
     });
-    progress.end();
+    drop(progress);
     outcome?;
     Ok(Trained { losses, untrained })
 }

@@ -2,11 +2,13 @@
 
 mod comparison;
 mod lengths;
+mod lrp;
 mod root;
 mod stage;
 mod velocity;
 mod wording;
 
+pub use lrp::lrp_figure;
 pub use stage::{Choice, Stage, Window};
 
 use std::path::Path;

@@ -1,12 +1,9 @@
 //! The rows of a table: the configs of a folder, under one budget, with their seeds.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
-
-use crate::evaluation::paper;
-use crate::experiment::ExperimentConfig;
+use super::{ExperimentConfig, ReproduceError};
+use crate::data::Dataset;
 
 /// A model, trained from one seed.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,25 +28,7 @@ pub struct Seeds {
     pub seeds: Vec<u64>,
 }
 
-impl std::str::FromStr for Seeds {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "expected NAME=SEED,SEED,..., such as whole_model=1,2,3".to_string();
-        let (name, list) = text.split_once('=').ok_or_else(expected)?;
-        let seeds = list.split(',').map(|seed| seed.trim().parse().ok());
-        let seeds: Vec<u64> = seeds.collect::<Option<_>>().ok_or_else(expected)?;
-        if seeds.iter().collect::<HashSet<_>>().len() != seeds.len() {
-            return Err(format!("names a seed twice; {}", expected()));
-        }
-        Ok(Self {
-            name: name.trim().into(),
-            seeds,
-        })
-    }
-}
-
-/// All rows of a folder of configs: first every model once, in the order of the paper's tables and then by name, then further seeds.
+/// All rows of a folder of configs: first every model once, those of `order` before the others, which go by name, then further seeds.
 ///
 /// # Errors
 /// The folder holds no config, one is bad, two have the same name, or seeds are given for a model that is not there.
@@ -58,21 +37,21 @@ pub fn read(
     budget: Option<&Path>,
     sets: &[String],
     seeds: &[Seeds],
-) -> anyhow::Result<Vec<Row>> {
+    order: &[&str],
+) -> Result<Vec<Row>, ReproduceError> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
         let config = ExperimentConfig::load_under(&file, budget, sets)
-            .with_context(|| format!("{} is no row", file.display()))?;
+            .map_err(|source| ReproduceError::NoRow { file, source })?;
         if configs.iter().any(|other| other.name == config.name) {
-            bail!(
-                "two configs in {} are called {}; give each a name of its own",
-                folder.display(),
-                config.name
-            );
+            return Err(ReproduceError::SameName {
+                folder: folder.into(),
+                name: config.name,
+            });
         }
         configs.push(config);
     }
-    let place = |name: &str| paper::ROWS.iter().position(|row| row.name == name);
+    let place = |name: &str| order.iter().position(|other| *other == name);
     configs.sort_by_key(|config| {
         (
             place(&config.name).unwrap_or(usize::MAX),
@@ -82,7 +61,7 @@ pub fn read(
     for (index, Seeds { name, .. }) in seeds.iter().enumerate() {
         known(&configs, name, "--seeds", folder)?;
         if seeds[..index].iter().any(|other| other.name == *name) {
-            bail!("--seeds names {name} twice; give all its seeds in one list");
+            return Err(ReproduceError::SeedsTwice { name: name.clone() });
         }
     }
     let (mut rows, mut further) = (Vec::new(), Vec::new());
@@ -106,7 +85,10 @@ pub fn read(
     for row in &rows {
         row.config
             .validate()
-            .with_context(|| format!("--seeds {}", row.config.name))?;
+            .map_err(|source| ReproduceError::Seeds {
+                name: row.config.name.clone(),
+                source,
+            })?;
     }
     Ok(rows)
 }
@@ -115,7 +97,11 @@ pub fn read(
 ///
 /// # Errors
 /// A name that no row has.
-pub fn chosen<'r>(rows: &'r [Row], only: &[String], folder: &Path) -> anyhow::Result<Vec<&'r Row>> {
+pub fn chosen<'r>(
+    rows: &'r [Row],
+    only: &[String],
+    folder: &Path,
+) -> Result<Vec<&'r Row>, ReproduceError> {
     let configs: Vec<_> = rows.iter().map(|row| row.config.clone()).collect();
     for name in only {
         known(&configs, name, "--only", folder)?;
@@ -124,39 +110,64 @@ pub fn chosen<'r>(rows: &'r [Row], only: &[String], folder: &Path) -> anyhow::Re
     Ok(rows.iter().filter(is_chosen).collect())
 }
 
+/// The data set of all rows.
+///
+/// # Errors
+/// Two rows read or split the data otherwise, or the data cannot be used.
+pub fn dataset(rows: &[Row], folder: &Path) -> Result<Dataset, ReproduceError> {
+    let (first, others) = rows.split_first().ok_or(ReproduceError::NoRows)?;
+    for row in others {
+        if row.config.data != first.config.data {
+            let differences = row.config.differences(&ExperimentConfig {
+                data: first.config.data.clone(),
+                ..row.config.clone()
+            })?;
+            return Err(ReproduceError::OtherDataConfig {
+                row: row.folder.clone(),
+                first: first.folder.clone(),
+                differences,
+            });
+        }
+    }
+    Ok(Dataset::load(folder, &first.config.data)?)
+}
+
 fn known(
     configs: &[ExperimentConfig],
     name: &str,
-    flag: &str,
+    flag: &'static str,
     folder: &Path,
-) -> anyhow::Result<()> {
+) -> Result<(), ReproduceError> {
     if configs.iter().any(|config| config.name == name) {
         return Ok(());
     }
-    let mut names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
+    let mut names: Vec<String> = configs.iter().map(|config| config.name.clone()).collect();
     names.dedup();
-    bail!(
-        "{flag} {name}: {} has no such config, but {}",
-        folder.display(),
-        names.join(", ")
-    )
+    Err(ReproduceError::Unknown {
+        flag,
+        name: name.into(),
+        folder: folder.into(),
+        names,
+    })
 }
 
 /// The TOML files of a folder, sorted.
-fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let unreadable = || format!("the folder of configs {} cannot be read", folder.display());
+fn files(folder: &Path) -> Result<Vec<PathBuf>, ReproduceError> {
+    let unreadable = |cause| ReproduceError::Folder {
+        folder: folder.into(),
+        cause,
+    };
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
-        let path = entry.with_context(unreadable)?.path();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
         if path.extension().is_some_and(|end| end == "toml") {
             files.push(path);
         }
     }
     if files.is_empty() {
-        bail!(
-            "{} holds no config (.toml); experiments/pan2021 does",
-            folder.display()
-        );
+        return Err(ReproduceError::NoConfig {
+            folder: folder.into(),
+        });
     }
     files.sort_unstable();
     Ok(files)

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
-
+use super::ReproduceError;
 use super::rows::Row;
-use crate::cli::tables::{NO_TRAINING, schedule_note};
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{EvaluatedData, Evaluation, EvaluationRecord, TableRow};
-use crate::report::{LossSeries, ValidationSeries, loss_curve, thousands, validation_curve};
-use crate::run::{LogLine, Manifest, RunFolder, RunState, replace_file};
+use crate::report::{
+    LossSeries, NO_TRAINING, ValidationSeries, loss_curve, schedule_note, thousands,
+    validation_curve,
+};
+use crate::run::{FileError, LogLine, Manifest, RunFolder, RunState, replace_file};
 
 const LOSS_CURVE: &str = "loss_curve.svg";
 const VALIDATION_CURVE: &str = "validation_curve.svg";
@@ -30,19 +31,21 @@ impl RowResults {
     ///
     /// # Errors
     /// The folder holds results of another config or other data (both are named), or a file of it is damaged.
-    pub fn read(&self, row: &Row, dataset: &Dataset) -> anyhow::Result<Option<EvaluationRecord>> {
+    pub fn read(
+        &self,
+        row: &Row,
+        dataset: &Dataset,
+    ) -> Result<Option<EvaluationRecord>, ReproduceError> {
         let path = self.folder.path();
         if !self.folder.config_path().exists() {
             return Ok(None);
         }
-        let remedy = "remove that folder to make it again, or give another --out";
         let differences = self.folder.config()?.differences(&row.config)?;
         if !differences.is_empty() {
-            bail!(
-                "{} holds results of another config ({}; values there, values now); {remedy}",
-                path.display(),
-                differences.join("; ")
-            );
+            return Err(ReproduceError::OtherConfig {
+                folder: path.into(),
+                differences,
+            });
         }
         let [scores, _] = EvaluationRecord::files(DataPart::Test);
         if !path.join(scores).exists() {
@@ -50,12 +53,11 @@ impl RowResults {
         }
         let record = EvaluationRecord::read(path)?;
         if record.data.data_digest != dataset.digest {
-            bail!(
-                "{} holds results on data with digest {}, the data folder has digest {}; {remedy}",
-                path.display(),
-                record.data.data_digest,
-                dataset.digest
-            );
+            return Err(ReproduceError::OtherData {
+                folder: path.into(),
+                saved: record.data.data_digest,
+                found: dataset.digest.clone(),
+            });
         }
         Ok(Some(record))
     }
@@ -64,7 +66,7 @@ impl RowResults {
     ///
     /// # Errors
     /// It is damaged.
-    pub fn manifest(&self) -> anyhow::Result<Option<Manifest>> {
+    pub fn manifest(&self) -> Result<Option<Manifest>, ReproduceError> {
         Ok(self.folder.manifest()?)
     }
 
@@ -78,24 +80,21 @@ impl RowResults {
         run: Option<&RunFolder>,
         evaluation: Evaluation,
         dataset: &Dataset,
-    ) -> anyhow::Result<()> {
+    ) -> Result<(), ReproduceError> {
         let path = self.folder.path();
-        std::fs::create_dir_all(path)
-            .with_context(|| format!("{} cannot be created", path.display()))?;
+        std::fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
         replace_file(&self.folder.config_path(), row.config.to_toml()?.as_bytes())?;
         if let Some(run) = run {
-            replace_file(
-                &self.folder.manifest_path(),
-                &std::fs::read(run.manifest_path())
-                    .with_context(|| format!("{} cannot be read", run.manifest_path().display()))?,
-            )?;
+            let manifest = run.manifest_path();
+            let content = std::fs::read(&manifest).map_err(FileError::at(&manifest, "read"))?;
+            replace_file(&self.folder.manifest_path(), &content)?;
             self.write_curves(row, &run.log()?)?;
         }
         let data = EvaluatedData::of(dataset, DataPart::Test)?;
         Ok(EvaluationRecord { evaluation, data }.write(path)?)
     }
 
-    fn write_curves(&self, row: &Row, log: &[LogLine]) -> anyhow::Result<()> {
+    fn write_curves(&self, row: &Row, log: &[LogLine]) -> Result<(), ReproduceError> {
         let Some(last) = log.last() else {
             return Ok(());
         };
@@ -103,7 +102,7 @@ impl RowResults {
             let frame_steps = thousands(last.frame_steps);
             format!("{what} of {}, {frame_steps} frame-steps", row.folder)
         };
-        let write = |name: &str, svg: String| -> anyhow::Result<()> {
+        let write = |name: &str, svg: String| -> Result<(), ReproduceError> {
             Ok(replace_file(
                 &self.folder.path().join(name),
                 svg.as_bytes(),
@@ -167,7 +166,7 @@ pub fn table_row(
     record: Option<&EvaluationRecord>,
     results: &RowResults,
     run: &RunFolder,
-) -> anyhow::Result<TableRow> {
+) -> Result<TableRow, ReproduceError> {
     let manifest = match record {
         Some(_) => results.manifest()?,
         None => run.manifest()?,

@@ -3,24 +3,20 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
+use super::ReproduceError;
 use super::results::{RowResults, table_row};
 use super::rows::Row;
 use crate::data::hexadecimal;
-use crate::evaluation::paper::{self, PaperRow};
 use crate::evaluation::{EvaluationRecord, TableRow, markdown_tables};
-use crate::report::{LrpSeries, lrp_curve};
-use crate::run::{RunFolder, replace_file, write_json};
+use crate::report::figures::lrp_figure;
+use crate::run::{FileError, RunFolder, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const FIGURE: &str = "lrp.svg";
 const MANIFEST: &str = "manifest.json";
-
-/// Models whose line in the figure has the paper's beside it; those of all would bury ours, and the tables have them.
-const REFERENCES: [&str; 2] = ["interpolation", "whole_model"];
 
 /// A row with what there is of it.
 pub struct Reported<'r> {
@@ -61,7 +57,7 @@ struct ManifestRow<'r> {
 ///
 /// # Errors
 /// A file cannot be read or written.
-pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Result<()> {
+pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> Result<(), ReproduceError> {
     let table_rows: Vec<TableRow> = rows
         .iter()
         .map(|reported| {
@@ -73,17 +69,13 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Re
             } = reported;
             table_row(row, record.as_ref(), results, run)
         })
-        .collect::<anyhow::Result<_>>()?;
+        .collect::<Result<_, ReproduceError>>()?;
     let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {
         return Ok(());
     };
     let tables = markdown_tables(&table_rows, &record.data.caption());
     replace_file(&out.join(TABLES), tables.as_bytes())?;
-    let title = "LRP on the test clips; dashed: the paper's";
-    replace_file(
-        &out.join(FIGURE),
-        lrp_curve(title, &lrp_series(&table_rows))?.as_bytes(),
-    )?;
+    replace_file(&out.join(FIGURE), lrp_figure(&table_rows)?.as_bytes())?;
     let mut files: Vec<PathBuf> = [TABLES, FIGURE].map(|name| out.join(name)).into();
     files.extend(rows.iter().flat_map(|reported| reported.results.files()));
     let manifest = Manifest {
@@ -94,7 +86,7 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Re
             .iter()
             .zip(&table_rows)
             .map(|(reported, table_row)| manifest_row(reported, table_row))
-            .collect::<anyhow::Result<_>>()?,
+            .collect::<Result<_, ReproduceError>>()?,
         files: digests(out, &files)?,
     };
     Ok(write_json(&out.join(MANIFEST), &manifest)?)
@@ -103,7 +95,7 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> anyhow::Re
 fn manifest_row<'r>(
     reported: &Reported<'r>,
     table_row: &TableRow,
-) -> anyhow::Result<ManifestRow<'r>> {
+) -> Result<ManifestRow<'r>, ReproduceError> {
     let training = match reported.record {
         Some(_) => reported.results.manifest()?,
         None => None,
@@ -123,59 +115,12 @@ fn manifest_row<'r>(
     })
 }
 
-fn digests(out: &Path, files: &[PathBuf]) -> anyhow::Result<BTreeMap<String, String>> {
+fn digests(out: &Path, files: &[PathBuf]) -> Result<BTreeMap<String, String>, FileError> {
     let digest = |path: &PathBuf| {
-        let content =
-            std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let content = std::fs::read(path).map_err(FileError::at(path, "read"))?;
         let name = path.strip_prefix(out).unwrap_or(path);
         let name: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
         Ok((name.join("/"), hexadecimal(&Sha256::digest(&content))))
     };
     files.iter().map(digest).collect()
-}
-
-/// LRP of every model with scores, the mean over its seeds, and of two the paper's; of the whole model the paper's in any case.
-fn lrp_series(rows: &[TableRow]) -> Vec<LrpSeries> {
-    let mut series: Vec<LrpSeries> = Vec::new();
-    for row in rows {
-        let name = paper::row(&row.name).map_or(row.name.as_str(), |paper| paper.title);
-        if series.iter().any(|known| known.name == name) {
-            continue;
-        }
-        let seeds: Vec<_> = rows
-            .iter()
-            .filter(|other| other.name == row.name)
-            .filter_map(|other| other.evaluation.as_ref())
-            .collect();
-        let Some(first) = seeds.first() else {
-            continue;
-        };
-        let mean = |length: usize| {
-            let sum: Option<f64> = seeds.iter().map(|seed| seed.lrp.at(length)).sum();
-            Some((length as f64, sum? / seeds.len() as f64))
-        };
-        series.push(LrpSeries {
-            name: name.into(),
-            ours: first.lrp.lengths().filter_map(mean).collect(),
-            paper: paper::row(&row.name)
-                .filter(|paper| REFERENCES.contains(&paper.name))
-                .map_or_else(Vec::new, papers_lrp),
-        });
-    }
-    if let Some(goal) = paper::row("whole_model")
-        && !series.iter().any(|known| known.name == goal.title)
-    {
-        series.push(LrpSeries {
-            name: goal.title.into(),
-            ours: Vec::new(),
-            paper: papers_lrp(goal),
-        });
-    }
-    series
-}
-
-/// `(N, LRP)` as printed.
-fn papers_lrp(row: &PaperRow) -> Vec<(f64, f64)> {
-    let lengths = paper::LENGTHS.iter().map(|&length| length as f64);
-    lengths.zip(row.lrp).collect()
 }
