@@ -1,9 +1,6 @@
 //! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between them as BVH.
 
 mod keyframes;
-mod points;
-mod summary;
-mod table;
 mod trajectory;
 mod velocity;
 
@@ -21,9 +18,10 @@ use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use crate::report::viewer::RequestMotion;
 use crate::report::{MotionKind, Viewer};
 use crate::run::{Subject, replace_file, write_json};
+use crate::synthesis::Summary;
+use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, control_warnings, synthesise};
-use keyframes::{KeyframeArgs, Keyframes};
-use summary::Summary;
+use keyframes::KeyframeArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
 
@@ -64,8 +62,8 @@ pub struct GenerateArgs {
 /// The run, a file or a control cannot be used, or they do not fit each other; nothing is written then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
-    let keyframes = Keyframes::read(&args.keyframes, &subject.config.data)?;
-    let request = keyframes.request(&args.keyframes)?;
+    let keyframes = Keyframes::read(&args.keyframes.choice(), &subject.config.data)?;
+    let request = keyframes.request(&args.keyframes.length)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
     let request = args.velocity.apply(request, &keyframes)?;
     warnings.extend(control_warnings(&request, subject.ranges.as_ref()));

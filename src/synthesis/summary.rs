@@ -1,12 +1,10 @@
-//! What a generation reports: on the terminal and as JSON.
+//! What there is to say of a sequence: as text and as JSON.
 
 use std::fmt;
 
 use serde::Serialize;
 
-use crate::synthesis::{
-    ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error,
-};
+use super::{ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error};
 
 /// The numbers of a generated sequence. Distances in cm, frames of the result.
 #[derive(Debug, Serialize)]
@@ -21,7 +19,7 @@ pub struct Summary {
     rotation_fit_error: Distances,
     /// cm/frame of a foot joint in predicted contact; none where no contact is predicted.
     foot_skate: Option<f64>,
-    /// The same after the feet were pinned; none without `--foot-cleanup`.
+    /// The same after the feet were pinned; none where they were not.
     foot_skate_cleaned: Option<f64>,
     warnings: Vec<String>,
 }
@@ -40,6 +38,7 @@ struct Distances {
 }
 
 impl Summary {
+    /// `model`: what to call the model.
     pub fn new(
         model: &str,
         request: &SequenceRequest,
