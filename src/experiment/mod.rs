@@ -1,6 +1,7 @@
 //! Experiments: configs in layers, and the tables that many of them make.
 
 pub mod config;
+mod demo;
 mod error;
 mod evaluated;
 pub(crate) mod layers;
@@ -13,6 +14,7 @@ pub use config::{
     AugmentationConfig, CheckpointConfig, ExperimentConfig, LogConfig, ScheduleConfig,
     ScheduledSamplingConfig, ValueError,
 };
+pub use demo::{DemoSettings, DemoSettingsError};
 pub use error::ReproduceError;
 pub use evaluated::{EvaluatedError, EvaluatedRun};
 pub use layers::ConfigError;

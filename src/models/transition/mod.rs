@@ -1,7 +1,9 @@
 //! Transitions between two keyframes: what Pan et al. 2021, Harvey et al. 2020 and the baselines share.
 
 pub(crate) mod augmentation;
+pub mod exported_batch;
 pub mod gradient_check;
+pub mod gradient_report;
 pub mod measure;
 pub(crate) mod motion_rows;
 pub(crate) mod network;

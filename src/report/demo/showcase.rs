@@ -3,9 +3,9 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use ndarray::{Array2, s};
 
+use super::DemoError;
 use crate::data::DanceClip;
 use crate::evaluation::window_request;
 use crate::models::transition::window_features;
@@ -14,8 +14,8 @@ use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
 use crate::report::{
-    Asked, MotionFigure, MotionKind, MotionRow, Placing, Shown, Viewer, ViewerKeyframe,
-    ViewerMotion,
+    Asked, FigureError, MotionFigure, MotionKind, MotionRow, Placing, Shown, Viewer,
+    ViewerKeyframe, ViewerMotion,
 };
 use crate::run::replace_file;
 use crate::synthesis::{SynthesisedMotion, transition_motion};
@@ -37,15 +37,17 @@ pub struct Showcase<'d> {
 impl<'d> Showcase<'d> {
     /// # Errors
     /// No clip is long enough.
-    pub fn new(clips: &'d [DanceClip]) -> anyhow::Result<Self> {
+    pub fn new(clips: &'d [DanceClip]) -> Result<Self, DemoError> {
         let clip = clips
             .iter()
             .find(|clip| clip.frames() > LENGTH)
-            .with_context(|| format!("no test clip has the frames of a transition of {LENGTH}"))?;
+            .ok_or(DemoError::TooShort { length: LENGTH })?;
         let start = (clip.frames() - LENGTH - 1) / 2;
         let recorded = window_features(&clip.features, start, LENGTH);
-        let request = window_request(&clip.clip, start, recorded.view())
-            .with_context(|| format!("{} has fewer poses than frames", clip.name))?;
+        let request =
+            window_request(&clip.clip, start, recorded.view()).ok_or_else(|| DemoError::Poses {
+                clip: clip.name.clone(),
+            })?;
         Ok(Self {
             clip,
             start,
@@ -63,7 +65,7 @@ impl<'d> Showcase<'d> {
         interpolation: &dyn TransitionModel,
         model: &dyn TransitionModel,
         files: &ShowcaseFiles,
-    ) -> anyhow::Result<SynthesisedMotion> {
+    ) -> Result<SynthesisedMotion, DemoError> {
         let predicted = self.predict(model)?;
         let motions = [
             ("Ground truth", MotionKind::Recorded, self.recorded.clone()),
@@ -88,11 +90,11 @@ impl<'d> Showcase<'d> {
         Ok(motion)
     }
 
-    fn predict(&self, model: &dyn TransitionModel) -> anyhow::Result<Transition> {
+    fn predict(&self, model: &dyn TransitionModel) -> Result<Transition, DemoError> {
         let mut transitions = model.transitions(std::slice::from_ref(&self.request))?;
-        transitions
-            .pop()
-            .with_context(|| format!("{} gave no transition", model.name()))
+        transitions.pop().ok_or_else(|| DemoError::NoTransition {
+            model: model.name().into(),
+        })
     }
 
     /// A prediction between the two keyframes as they were given, `[N + 1, 149]`.
@@ -104,7 +106,7 @@ impl<'d> Showcase<'d> {
     }
 
     /// The motions in rows.
-    fn figure(&self, motions: &[Named]) -> anyhow::Result<String> {
+    fn figure(&self, motions: &[Named]) -> Result<String, FigureError> {
         let rows = motions.iter().map(|(label, kind, frames)| {
             let frames = frames.rows().into_iter().map(world_positions).collect();
             MotionRow::between_keyframes(*label, frames, *kind != MotionKind::Recorded)
@@ -116,11 +118,11 @@ impl<'d> Showcase<'d> {
             shown: Shown::Every(EVERY),
             placing: Placing::OnFirstPath,
         };
-        Ok(figure.svg()?)
+        figure.svg()
     }
 
     /// The motions in the viewer.
-    fn viewer(&self, motions: &[Named]) -> anyhow::Result<String> {
+    fn viewer(&self, motions: &[Named]) -> Result<String, FigureError> {
         let motions = motions
             .iter()
             .map(|(name, kind, frames)| ViewerMotion::from_features(*name, *kind, frames.view()));
@@ -138,7 +140,7 @@ impl<'d> Showcase<'d> {
                 self.request.velocity_factors.view(),
             )),
         };
-        Ok(viewer.html()?)
+        viewer.html()
     }
 }
 

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Evaluation, TableRow};
+use crate::experiment::ExperimentConfig;
+use crate::report::{NO_TRAINING, schedule_note};
+use crate::run::Manifest;
 
 /// Lengths of transition (frames) at which a model must be ahead: where the keyframes say little of the dance between them.
 const LONG: [usize; 2] = [100, 150];
@@ -22,6 +25,36 @@ impl Comparison {
     pub fn is_ahead(&self) -> bool {
         self.long()
             .all(|(_, [model, untrained, other])| model < untrained && model < other)
+    }
+
+    /// The rows of the three in the tables, the model trained as config and manifest say.
+    pub fn rows(&self, config: &ExperimentConfig, manifest: &Manifest) -> [TableRow; 3] {
+        let row = |name: &str, seed, evaluation: &Evaluation, schedule_note: &str| TableRow {
+            name: name.into(),
+            seed,
+            evaluation: Some(evaluation.clone()),
+            schedule_note: schedule_note.into(),
+        };
+        [
+            row(
+                "interpolation, generated clips",
+                None,
+                &self.interpolation,
+                NO_TRAINING,
+            ),
+            row(
+                "linear estimate, generated clips",
+                None,
+                &self.untrained,
+                "the small whole model before its training",
+            ),
+            row(
+                "small whole model, generated clips",
+                Some(manifest.seed),
+                &self.model,
+                &schedule_note(config, manifest),
+            ),
+        ]
     }
 
     /// Length, LRP (cm) of the model, of the model untrained and of interpolation.
