@@ -26,7 +26,7 @@ use crate::training::Trainer;
 /// Exit code of a demo whose model is behind interpolation or behind itself before its training.
 const BEHIND: u8 = 4;
 
-/// Generates dance clips, trains a small model on them, evaluates it beside what needs no training, writes tables and figures.
+/// Generate dance clips, train a small model on them, and write its scores beside what needs no training
 ///
 /// Needs no data, takes two to three minutes on two cores and gives the same numbers each time. Ends with exit code 4 if the
 /// model is not ahead in LRP at 100 and 150 frames, of interpolation and of the linear estimate that it was before its training.

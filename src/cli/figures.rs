@@ -12,9 +12,9 @@ use crate::report::figures::index;
 use crate::report::figures::pan2021::{Cast, Choice, Stage};
 use crate::run::{Subject, replace_file};
 
-/// Draws figures 4 (b) to 12 of the paper with a trained model, each as SVG with a caption and its numbers as CSV beside it.
+/// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
 ///
-/// A figure shows one transition of a test clip: by default the one in the middle of the first clip by name. Captions and CSV files give means
+/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a test clip: by default the one in the middle of the first clip by name. Captions and CSV files give means
 /// over such a transition of every test clip that is long enough. A model follows a control where it gives at least a third of the change that is asked
 /// for; the captions of figures 6 to 9 say so where it does not. Motion is shown as the model predicts it, neither bent onto the keyframes nor cleaned up.
 #[derive(Debug, Args)]

@@ -11,21 +11,17 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::notice;
-use crate::models::ModelConfig;
-use crate::models::baselines::interpolation::Interpolation;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
-use crate::report::viewer::RequestMotion;
-use crate::report::{MotionKind, Viewer};
+use crate::report::viewer::generated_page;
 use crate::run::{Subject, replace_file, write_json};
-use crate::synthesis::Summary;
 use crate::synthesis::keyframes::Keyframes;
-use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, control_warnings, synthesise};
+use crate::synthesis::{Summary, SynthesisOptions, control_warnings, synthesise};
 use keyframes::KeyframeArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
 
-/// Generates the dance between keyframes and writes it as BVH.
+/// Generate the dance between keyframes and write it as BVH
 ///
 /// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a file at another rate is resampled first, so frame 120 of the
 /// file's own 120 a second is frame 30 here. The result passes through every keyframe. Keyframes of several dancers are put onto the first one's bones.
@@ -77,7 +73,9 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
     let document = document(&sequence.clip, keyframes.channels())?;
     let page = match &args.viewer {
-        Some(_) => Some(page(&subject, &keyframes, &request, &sequence, &options)?),
+        Some(_) => Some(generated_page(
+            &subject, &keyframes, &request, &sequence, &options,
+        )?),
         None => None,
     };
     bvh::write(&args.out, &document)?;
@@ -90,45 +88,6 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     }
     writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())
-}
-
-/// The viewer's page: the recorded motion where it runs along, interpolation under the same controls beside any other model, what was generated.
-fn page(
-    subject: &Subject,
-    keyframes: &Keyframes,
-    request: &SequenceRequest,
-    sequence: &Sequence,
-    options: &SynthesisOptions,
-) -> anyhow::Result<String> {
-    let interpolation = Interpolation {
-        contact_threshold: subject.config.data.contact_threshold,
-    };
-    let name = "Interpolation";
-    let interpolated = match matches!(subject.config.model, ModelConfig::Interpolation(_)) {
-        false => Some(synthesise(&interpolation, request, options, name)?),
-        true => None,
-    };
-    let mut shown = Vec::new();
-    if let Some(frames) = keyframes.recorded(request) {
-        shown.push(RequestMotion {
-            name: "Ground truth",
-            kind: MotionKind::Recorded,
-            frames,
-        });
-    }
-    if let Some(interpolated) = &interpolated {
-        shown.push(RequestMotion {
-            name,
-            kind: MotionKind::Other,
-            frames: interpolated.features.view(),
-        });
-    }
-    shown.push(RequestMotion {
-        name: &subject.config.name,
-        kind: MotionKind::Model,
-        frames: sequence.features.view(),
-    });
-    Ok(Viewer::of_request(&sequence.clip.name, request, &shown).html()?)
 }
 
 /// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.

@@ -20,6 +20,8 @@ use crate::experiment::{Ending, Observer, ReproduceError, Reproduction, Row, See
 use crate::models::transition::TransitionModel;
 use crate::training::{Resumed, StepReport, Trainer, TrainingError};
 
+/// Train and evaluate every config of a folder, and write tables, figures and a manifest
+///
 /// Trains every config of a folder that is not trained yet, evaluates it on the test clips and writes tables 2 to 4 with the paper's
 /// value, ours and the difference, figures and a manifest.
 ///
