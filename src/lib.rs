@@ -18,7 +18,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod autograd;
-#[cfg(any())]
+#[cfg(feature = "papers")]
 pub mod cli;
 pub mod data;
 pub mod evaluation;
@@ -27,7 +27,7 @@ pub mod models;
 pub mod motion;
 pub mod nn;
 pub mod optim;
-#[cfg(any())]
+#[cfg(feature = "papers")]
 pub mod report;
 pub mod run;
 #[cfg(feature = "papers")]

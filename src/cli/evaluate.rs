@@ -2,20 +2,17 @@
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::clip_choice::ClipChoice;
-use super::evaluation_record::{EvaluatedData, EvaluationRecord};
 use super::notice::notice;
-use super::subject::Subject;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::data::Dataset;
-use crate::evaluation::{Protocol, TableRow, terminal_tables};
-use crate::run::{RunFolder, replace_file};
+use crate::data::{DataPart, Dataset};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, Protocol, TableRow, terminal_tables};
+use crate::run::Subject;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -63,13 +60,14 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         subject.check_data(&dataset, &args.data)?;
     }
     let mut out = std::io::stdout();
-    let data = EvaluatedData::of(&dataset, args.clips)?;
+    let part = DataPart::from(args.clips);
+    let data = EvaluatedData::of(&dataset, part)?;
     writeln!(
         out,
         "{} on {} {} clips, {} frames\n",
         subject.what, data.clips, data.part, data.frames
     )?;
-    let clips = args.clips.of(&dataset)?;
+    let clips = part.of(&dataset)?;
     let outcome = args
         .threads
         .pool()?
@@ -95,7 +93,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         Some(run) => args.lengths.is_empty() && run.config()?.model == subject.config.model,
         None => true,
     };
-    if let Some(folder) = subject.folder(args.out.as_deref())?
+    if let Some(folder) = subject.scores_folder(args.out.as_deref())?
         && of_its_own
     {
         record.write(folder)?;
@@ -114,32 +112,5 @@ impl EvaluateArgs {
             lengths: lengths.into_iter().collect(),
             ..paper
         }
-    }
-}
-
-impl Subject {
-    /// The folder that keeps the scores, made where a config asks for one.
-    fn folder<'a>(&'a self, out: Option<&'a Path>) -> anyhow::Result<Option<&'a Path>> {
-        if let Some(run) = &self.run {
-            return Ok(Some(run.path()));
-        }
-        let Some(folder) = out else {
-            return Ok(None);
-        };
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{} cannot be created", folder.display()))?;
-        let run = RunFolder::open(folder);
-        if run.config_path().exists() {
-            let differences = run.config()?.differences(&self.config)?;
-            if !differences.is_empty() {
-                anyhow::bail!(
-                    "{} holds scores of another config ({}); values there, values now; give another --out",
-                    folder.display(),
-                    differences.join("; ")
-                );
-            }
-        }
-        replace_file(&run.config_path(), self.config.to_toml()?.as_bytes())?;
-        Ok(Some(folder))
     }
 }

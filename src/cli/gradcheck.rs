@@ -3,21 +3,11 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::bail;
 use clap::Args;
-use rayon::prelude::*;
 
-use crate::autograd::check::{CheckReport, ParameterReport};
 use crate::experiment::ExperimentConfig;
-use crate::models::transition::Feed;
-use crate::models::transition::gradient_check::{GradientCase, GradientCheckConfig, check_model};
-
-/// Largest error that passes.
-const TOLERANCE: f64 = 1e-5;
-/// Largest share of numbers that may stand at a kink.
-const MOST_KINKS: f64 = 0.02;
-/// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
-const TRANSITIONS: [usize; 2] = [12, 6];
+use crate::models::transition::gradient_check::GradientCheckConfig;
+use crate::models::transition::gradient_report::GradientReport;
 
 #[derive(Debug, Args)]
 pub struct GradcheckArgs {
@@ -60,100 +50,7 @@ pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
         per_parameter: args.per_parameter,
         seed: args.seed,
     };
-    let cases = cases(args.frames.map(usize::from));
-    let reports = cases
-        .par_iter()
-        .map(|&case| check_model(&model, case, config))
-        .collect::<Result<Vec<_>, _>>()?;
-    let reports: Vec<_> = cases
-        .iter()
-        .zip(reports)
-        .filter_map(|(case, report)| Some((case, report?)))
-        .collect();
-    let mut out = std::io::stdout().lock();
-    for (case, report) in &reports {
-        writeln!(out, "{}", title(case))?;
-        write!(out, "{}", table(report))?;
-        writeln!(out)?;
-    }
-    let reports = || reports.iter().map(|(_, report)| report);
-    let error = reports().map(CheckReport::error).fold(0.0, f64::max);
-    let compared: usize = reports().map(CheckReport::compared).sum();
-    let kinks: usize = reports().map(CheckReport::kinks).sum();
-    writeln!(
-        out,
-        "{compared} numbers compared, {kinks} at kinks left out; largest error {error:.1e}"
-    )?;
-    if error > TOLERANCE {
-        bail!("a gradient is wrong: its error {error:.1e} is above {TOLERANCE:.0e}");
-    }
-    let drawn = compared + kinks;
-    if drawn == 0 || kinks as f64 > MOST_KINKS * drawn as f64 {
-        bail!(
-            "too little was compared: {kinks} of {drawn} numbers stand at a kink; another --seed may draw better ones"
-        );
-    }
-    Ok(())
-}
-
-fn cases(frames: Option<usize>) -> Vec<GradientCase> {
-    let transitions = frames.map_or(TRANSITIONS.to_vec(), |frames| vec![frames]);
-    let mut cases = Vec::new();
-    for transition in transitions {
-        for feed in [Feed::Predictions, Feed::GroundTruth] {
-            for dropout in [false, true] {
-                cases.push(GradientCase {
-                    transition,
-                    feed,
-                    dropout,
-                });
-            }
-        }
-    }
-    cases
-}
-
-fn title(case: &GradientCase) -> String {
-    let feed = match case.feed {
-        Feed::GroundTruth => "the truth fed",
-        Feed::Predictions => "own predictions fed",
-    };
-    let dropout = if case.dropout { "on" } else { "off" };
-    format!("N = {}, {feed}, dropout {dropout}", case.transition)
-}
-
-/// A row for each part of the network: what its parameters' names begin with.
-fn table(report: &CheckReport) -> String {
-    let mut groups: Vec<(&str, Vec<&ParameterReport>)> = Vec::new();
-    for parameter in &report.parameters {
-        let group = parameter.parameter.split('.').next().unwrap_or_default();
-        match groups.iter_mut().find(|(name, _)| *name == group) {
-            Some((_, members)) => members.push(parameter),
-            None => groups.push((group, vec![parameter])),
-        }
-    }
-    let mut text = format!(
-        "  {:<28} {:>8} {:>6} {:>9}  {}\n",
-        "part", "compared", "kinks", "error", "where"
-    );
-    for (group, members) in groups {
-        let compared: usize = members.iter().map(|p| p.compared).sum();
-        let kinks: usize = members.iter().map(|p| p.kinks).sum();
-        let worst = members
-            .iter()
-            .filter_map(|p| p.worst.as_ref().map(|worst| (p, worst)))
-            .max_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
-        let (error, place) = match worst {
-            Some((parameter, worst)) => (
-                format!("{:.1e}", worst.error),
-                format!(
-                    "{}[{}]: gradient {:.8e}, difference {:.8e}",
-                    parameter.parameter, worst.index, worst.analytic, worst.numeric
-                ),
-            ),
-            None => ("-".into(), "-".into()),
-        };
-        text += &format!("  {group:<28} {compared:>8} {kinks:>6} {error:>9}  {place}\n");
-    }
-    text
+    let report = GradientReport::of(&model, args.frames.map(usize::from), config)?;
+    write!(std::io::stdout(), "{report}")?;
+    Ok(report.verdict()?)
 }

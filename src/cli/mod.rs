@@ -8,7 +8,6 @@ mod choreography;
 mod clip_choice;
 mod demo;
 mod evaluate;
-mod evaluation_record;
 mod export_batch;
 mod features;
 mod figures;
@@ -19,11 +18,9 @@ mod progress;
 mod reproduce;
 mod runs;
 mod stop;
-mod subject;
 mod tables;
 mod threads;
 mod train;
-mod viewer_page;
 mod watched;
 
 use std::io;
@@ -50,34 +47,33 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Time the generation of frames
-    BenchGenerate(bench_generate::BenchGenerateArgs),
-    /// Time an LSTM and two Transformer encoder layers, forward and backward
-    BenchLayers(bench_layers::BenchLayersArgs),
-    /// Time a training step
-    BenchStep(bench_step::BenchStepArgs),
-    /// Write generated dance clips as BVH files
-    Choreography(choreography::ChoreographyArgs),
-    Demo(demo::DemoArgs),
-    /// Look into BVH files
-    Bvh(bvh::BvhArgs),
-    /// Write a batch with a trained model's outputs, losses and gradients
-    ExportBatch(export_batch::ExportBatchArgs),
-    /// Write the features of every frame of a BVH file as one array
-    Features(features::FeaturesArgs),
-    Figures(figures::FiguresArgs),
-    Generate(Box<generate::GenerateArgs>),
-    /// Compare the gradient of a model's whole loss with central differences
-    Gradcheck(gradcheck::GradcheckArgs),
     /// Train a model
     Train(train::TrainArgs),
     /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
     Evaluate(evaluate::EvaluateArgs),
-    /// Train and evaluate every config of a folder, and write tables, figures and a manifest
+    Generate(Box<generate::GenerateArgs>),
     Reproduce(reproduce::ReproduceArgs),
-    Runs(runs::RunsArgs),
+    Figures(figures::FiguresArgs),
     /// Set scores beside the paper's in its tables 2 to 4
     Tables(tables::TablesArgs),
+    Runs(runs::RunsArgs),
+    Demo(demo::DemoArgs),
+    /// Write generated dance clips as BVH files
+    Choreography(choreography::ChoreographyArgs),
+    /// Look into BVH files
+    Bvh(bvh::BvhArgs),
+    /// Write the features of every frame of a BVH file as one array
+    Features(features::FeaturesArgs),
+    /// Compare the gradient of a model's whole loss with central differences
+    Gradcheck(gradcheck::GradcheckArgs),
+    /// Write a batch with a trained model's outputs, losses and gradients
+    ExportBatch(export_batch::ExportBatchArgs),
+    /// Time a training step
+    BenchStep(bench_step::BenchStepArgs),
+    /// Time an LSTM and two Transformer encoder layers, forward and backward
+    BenchLayers(bench_layers::BenchLayersArgs),
+    /// Time the generation of frames
+    BenchGenerate(bench_generate::BenchGenerateArgs),
 }
 
 impl Cli {
@@ -88,22 +84,22 @@ impl Cli {
     pub fn run(self) -> anyhow::Result<ExitCode> {
         Isa::asked_for()?;
         match self.command {
-            Command::BenchGenerate(args) => bench_generate::run(args)?,
-            Command::BenchLayers(args) => bench_layers::run(args)?,
-            Command::BenchStep(args) => bench_step::run(args)?,
-            Command::Choreography(args) => choreography::run(args)?,
-            Command::Demo(args) => return demo::run(args),
-            Command::Bvh(args) => bvh::run(args)?,
-            Command::ExportBatch(args) => export_batch::run(args)?,
-            Command::Features(args) => features::run(args)?,
-            Command::Figures(args) => figures::run(args)?,
-            Command::Generate(args) => generate::run(*args)?,
-            Command::Gradcheck(args) => gradcheck::run(args)?,
-            Command::Runs(args) => runs::run(args)?,
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => evaluate::run(args)?,
+            Command::Generate(args) => generate::run(*args)?,
             Command::Reproduce(args) => return reproduce::run(args),
+            Command::Figures(args) => figures::run(args)?,
             Command::Tables(args) => tables::run(args)?,
+            Command::Runs(args) => runs::run(args)?,
+            Command::Demo(args) => return demo::run(args),
+            Command::Choreography(args) => choreography::run(args)?,
+            Command::Bvh(args) => bvh::run(args)?,
+            Command::Features(args) => features::run(args)?,
+            Command::Gradcheck(args) => gradcheck::run(args)?,
+            Command::ExportBatch(args) => export_batch::run(args)?,
+            Command::BenchStep(args) => bench_step::run(args)?,
+            Command::BenchLayers(args) => bench_layers::run(args)?,
+            Command::BenchGenerate(args) => bench_generate::run(args)?,
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -35,10 +35,9 @@ impl Progress {
             bar.set_position(before);
             bar
         });
-        Self {
-            bar,
-            ..Self::lines(String::new(), schedule, before)
-        }
+        let mut progress = Self::lines(String::new(), schedule, before);
+        progress.bar = bar;
+        progress
     }
 
     /// Lines that begin with a name, for a training that is not the only one; `before` as in [`Progress::new`].
@@ -79,9 +78,11 @@ impl Progress {
             notice(what);
         }
     }
+}
 
+impl Drop for Progress {
     /// Leaves the bar as it is.
-    pub fn end(&self) {
+    fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.abandon();
         }

@@ -1,38 +1,13 @@
 //! `keydance runs`: reads a folder of runs, writes what became of each.
 
-use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
 
-use super::evaluation_record::EvaluationRecord;
-use super::tables::thousands;
-use crate::experiment::ExperimentConfig;
-use crate::run::{RunFolder, RunProgress, RunStatus};
-use crate::training::TrainingError;
-
-/// Folders inside folders that are looked through for runs.
-const DEEPEST: usize = 4;
-/// Transition lengths whose LRP is shown, frames.
-const LENGTHS: [usize; 4] = [10, 50, 100, 150];
-const HEADER: [&str; 12] = [
-    "run",
-    "name",
-    "state",
-    "steps",
-    "%",
-    "frame-steps",
-    "frames/s",
-    "LRP 10",
-    "50",
-    "100",
-    "150",
-    "made by",
-];
-/// Columns of text; the others hold numbers and are aligned on the right.
-const TEXT: [usize; 4] = [0, 1, 2, 11];
+use crate::report::RunTable;
+use crate::run::RunFolder;
 
 /// List the runs in a folder: state, progress, speed, scores
 ///
@@ -49,174 +24,15 @@ pub struct RunsArgs {
 /// # Errors
 /// The folder cannot be read, or holds no run. A damaged run is listed as such and is no error.
 pub fn run(args: RunsArgs) -> anyhow::Result<()> {
-    let mut folders = Vec::new();
-    find(&args.folder, DEEPEST, &mut folders)
+    let table = RunTable::of(&args.folder)
         .with_context(|| format!("the folder {} cannot be read", args.folder.display()))?;
-    folders.sort_unstable();
-    if folders.is_empty() {
+    if table.is_empty() {
         anyhow::bail!(
             "{} holds no run: no folder in it has a {}; `keydance train` makes one",
             args.folder.display(),
             RunFolder::CONFIG
         );
     }
-    let runs: Vec<Row> = folders
-        .iter()
-        .map(|folder| Row::read(folder, name(folder, &args.folder)))
-        .collect();
-    let mut out = std::io::stdout();
-    write!(out, "{}", table(&runs))?;
-    for run in &runs {
-        for problem in &run.problems {
-            writeln!(out, "{}: {problem}", run.cells[0])?;
-        }
-    }
+    write!(std::io::stdout(), "{table}")?;
     Ok(())
-}
-
-/// Adds the runs' folders at and below a folder.
-fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Result<()> {
-    if folder.join(RunFolder::CONFIG).is_file() {
-        found.push(folder.into());
-        return Ok(());
-    }
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        // Links are not followed: they may lead back.
-        if depth > 0 && entry.file_type()?.is_dir() {
-            // A folder inside that cannot be read holds nothing to list.
-            let _ = find(&entry.path(), depth - 1, found);
-        }
-    }
-    Ok(())
-}
-
-/// What to call a run: its path below the folder that is listed.
-fn name(run: &Path, folder: &Path) -> String {
-    match run.strip_prefix(folder) {
-        Ok(rest) if !rest.as_os_str().is_empty() => rest.display().to_string(),
-        _ => run.display().to_string(),
-    }
-}
-
-/// A line of the table, and what is wrong with the run.
-struct Row {
-    cells: [String; HEADER.len()],
-    problems: Vec<String>,
-}
-
-impl Row {
-    fn read(folder: &Path, name: String) -> Self {
-        let mut row = Self {
-            cells: Default::default(),
-            problems: Vec::new(),
-        };
-        row.cells[0] = name;
-        let run = RunFolder::open(folder);
-        if let Err(error) = row.fill(&run) {
-            row.cells[2] = "damaged".into();
-            row.problems.push(error.to_string());
-        }
-        match EvaluationRecord::read(folder) {
-            Ok(record) => row.score(&record),
-            Err(error) if EvaluationRecord::is_in(folder) => {
-                row.problems.push(format!("{error:#}"))
-            }
-            Err(_) => {}
-        }
-        row
-    }
-
-    fn fill(&mut self, run: &RunFolder) -> Result<(), TrainingError> {
-        // First what needs no config: it may be of another version.
-        let progress = run.progress()?;
-        if let Some(progress) = &progress {
-            self.progress(progress);
-        }
-        let config = run.config()?;
-        self.cells[1] = config.name.clone();
-        self.cells[2] = state(&config, progress.as_ref(), run);
-        Ok(())
-    }
-
-    fn progress(&mut self, progress: &RunProgress) {
-        let manifest = &progress.manifest;
-        let share = progress.steps_done as f64 / manifest.steps.max(1) as f64;
-        self.cells[1] = manifest.name.clone();
-        self.cells[3] = format!("{}/{}", progress.steps_done, manifest.steps);
-        self.cells[4] = format!("{:.0}", (100.0 * share).floor());
-        self.cells[5] = thousands(progress.frame_steps_done);
-        if let Some(speed) = progress.frame_steps_per_second {
-            self.cells[6] = format!("{speed:.0}");
-        }
-        self.cells[11] = version(&manifest.version, manifest.commit.as_deref());
-    }
-
-    fn score(&mut self, record: &EvaluationRecord) {
-        let EvaluationRecord { evaluation, data } = record;
-        if self.cells[11].is_empty() {
-            self.cells[11] = version(&data.version, data.commit.as_deref());
-        }
-        for (cell, length) in self.cells[7..].iter_mut().zip(LENGTHS) {
-            if let Some(score) = evaluation.lrp.at(length) {
-                *cell = format!("{score:.1}");
-            }
-        }
-    }
-}
-
-/// A version and the first digits of its commit.
-fn version(version: &str, commit: Option<&str>) -> String {
-    let short: String = commit.unwrap_or_default().chars().take(7).collect();
-    format!("{version} {short}").trim_end().into()
-}
-
-fn state(config: &ExperimentConfig, progress: Option<&RunProgress>, run: &RunFolder) -> String {
-    let Some(progress) = progress else {
-        let untrained = config.model.untrained(config.data.contact_threshold);
-        return if untrained.is_some() {
-            "needs no training"
-        } else {
-            "not begun"
-        }
-        .into();
-    };
-    match progress.status {
-        RunStatus::Running => "running",
-        RunStatus::Stopped => "stopped",
-        RunStatus::Interrupted => "interrupted",
-        RunStatus::Diverged => "diverged",
-        RunStatus::Finished if run.weights().exists() => "finished",
-        RunStatus::Finished => "finished, no weights",
-    }
-    .into()
-}
-
-fn table(rows: &[Row]) -> String {
-    let header = HEADER.map(String::from);
-    let lines: Vec<&[String; HEADER.len()]> = std::iter::once(&header)
-        .chain(rows.iter().map(|row| &row.cells))
-        .collect();
-    let widths: Vec<usize> = (0..HEADER.len())
-        .map(|column| lines.iter().map(|line| line[column].chars().count()).max())
-        .map(Option::unwrap_or_default)
-        .collect();
-    let mut text = String::new();
-    for line in lines {
-        let cells: Vec<String> = line
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(column, (cell, &width))| {
-                if TEXT.contains(&column) {
-                    format!("{cell:<width$}")
-                } else {
-                    format!("{cell:>width$}")
-                }
-            })
-            .collect();
-        text += cells.join("  ").trim_end();
-        text.push('\n');
-    }
-    text
 }

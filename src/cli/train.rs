@@ -1,6 +1,6 @@
 //! `keydance train`: reads a config and a data folder, writes a run's folder.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use super::threads::Threads;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::run::RunFolder;
-use crate::training::{Outcome, Trainer, TrainingError};
+use crate::training::{Outcome, Resumed, Trainer};
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -43,19 +43,30 @@ pub struct TrainArgs {
 /// The config, the data or the run's folder cannot be used; the training diverged.
 pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
-    let mut out = std::io::stdout();
+    let mut out = io::stdout();
     writeln!(out, "{}", config.to_toml()?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
     let threads = args.threads.count();
     let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
     describe(&trainer, threads)?;
     let run = if args.resume {
-        resume(&mut trainer, &args.out, &config)?
+        let run = RunFolder::resume(&args.out, &config)?;
+        goes_on(&trainer.resume(&run)?)?;
+        run
     } else {
         RunFolder::create(&args.out, &config)?
     };
-    let progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
-    match train(&mut trainer, &run, &Stop::on_signal()?, progress)? {
+    let mut progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
+    let stop = Stop::on_signal()?;
+    let outcome = trainer.run(Some(&run), &mut |report| {
+        progress.step(report);
+        match stop.is_asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
+    drop(progress);
+    match outcome? {
         Outcome::Finished => {
             writeln!(out, "{}", run.weights().display())?;
             writeln!(out, "weights {}", trainer.weights_digest())?;
@@ -72,51 +83,14 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Trains to the end or until asked to stop, and shows on `progress` how far it has come.
+/// Says how large the training is, and what of it cannot be trained.
 ///
 /// # Errors
-/// As [`Trainer::run`].
-pub fn train(
-    trainer: &mut Trainer<'_>,
-    run: &RunFolder,
-    stop: &Stop,
-    mut progress: Progress,
-) -> Result<Outcome, TrainingError> {
-    let outcome = trainer.run(Some(run), &mut |report| {
-        progress.step(report);
-        match stop.is_asked() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
-    });
-    progress.end();
-    outcome
-}
-
-/// Takes a run up where its newest whole checkpoint left it, and says so.
-///
-/// # Errors
-/// The run is of another config or other data, or has no whole checkpoint.
-pub fn resume(
-    trainer: &mut Trainer<'_>,
-    path: &Path,
-    config: &ExperimentConfig,
-) -> anyhow::Result<RunFolder> {
-    let run = RunFolder::resume(path, config)?;
-    let resumed = trainer.resume(&run)?;
-    for problem in &resumed.damaged {
-        notice(format_args!(
-            "warning: a newer checkpoint is left out: {problem}"
-        ));
-    }
-    writeln!(std::io::stdout(), "goes on after step {}", resumed.steps)?;
-    Ok(run)
-}
-
-pub fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
+/// The output cannot be written.
+pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
     let schedule = trainer.schedule();
     writeln!(
-        std::io::stdout(),
+        io::stdout(),
         "{} parameters; {} epochs, {} steps, {} frame-steps; {threads} threads",
         trainer.parameters().weights(),
         schedule.epochs(),
@@ -130,6 +104,19 @@ pub fn describe(trainer: &Trainer<'_>, threads: usize) -> anyhow::Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Says after which step a training goes on, and which newer checkpoints are damaged.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn goes_on(resumed: &Resumed) -> io::Result<()> {
+    for problem in &resumed.damaged {
+        notice(format_args!(
+            "warning: a newer checkpoint is left out: {problem}"
+        ));
+    }
+    writeln!(io::stdout(), "goes on after step {}", resumed.steps)
 }
 
 /// The command that goes on where `args` stopped.

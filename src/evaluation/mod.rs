@@ -5,11 +5,13 @@ pub mod equations;
 mod metric;
 mod printed;
 pub mod protocol;
+mod record;
 pub mod scores;
 pub mod tables;
 
 pub use metric::{Better, Metric};
 pub use printed::{PrintedError, PrintedRow, PrintedTable, PrintedTables};
 pub use protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
+pub use record::{EvaluatedData, EvaluationRecord, RecordError};
 pub use scores::{ScoreRow, Scores};
 pub use tables::{TableRow, Tables};

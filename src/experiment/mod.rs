@@ -1,7 +1,17 @@
-//! Experiments: configs in layers.
+//! Experiments: configs in layers, and the tables that many of them make.
 
 pub mod config;
+mod error;
+mod evaluated;
 mod layers;
+mod report;
+mod reproduce;
+mod results;
+pub mod rows;
 
 pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
+pub use error::ReproduceError;
+pub use evaluated::{EvaluatedError, EvaluatedRun};
 pub use layers::ConfigError;
+pub use reproduce::{Ending, Observer, Reproduction};
+pub use rows::{Row, Seeds};

@@ -1,15 +1,20 @@
 //! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as HTML.
 //!
-//! A figure knows numbers and positions only, no model and no training.
+//! A figure knows numbers and positions only, no model and no training; the figures of a paper in [`figures`] ask models for them.
 
 pub mod camera;
 pub mod chart;
 mod dancer;
+pub mod demo;
+pub mod figures;
 pub mod loss_curve;
 pub mod lrp_curve;
 pub mod motion_figure;
 pub mod root_panel;
+mod run_table;
+mod schedule_note;
 pub mod svg;
+mod thousands;
 pub mod validation_curve;
 pub mod viewer;
 
@@ -17,6 +22,9 @@ pub use loss_curve::{LossSeries, loss_curve};
 pub use lrp_curve::{LrpSeries, lrp_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};
+pub use run_table::RunTable;
+pub use schedule_note::{NO_TRAINING, schedule_note};
+pub use thousands::thousands;
 pub use validation_curve::{ValidationSeries, validation_curve};
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 

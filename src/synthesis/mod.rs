@@ -8,10 +8,12 @@ mod blend;
 pub mod controls;
 mod error;
 mod foot_cleanup;
+pub mod keyframes;
 mod motion;
 mod request;
 mod retarget;
 mod sequence;
+mod summary;
 mod warning;
 
 pub use error::SynthesisError;
@@ -20,4 +22,5 @@ pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};
 pub use sequence::{
     FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise, trajectory_error,
 };
+pub use summary::Summary;
 pub use warning::{ControlWarning, control_warnings, moved_warnings};

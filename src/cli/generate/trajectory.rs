@@ -3,11 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use glam::DVec3;
 
-use super::keyframes::Keyframes;
-use super::{points, table};
-use crate::synthesis::controls::{Speed, smooth_curve};
+use crate::synthesis::controls::{Points, Speed, read_trajectory};
+use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, SequenceRequest, moved_warnings};
 
 #[derive(Debug, Args)]
@@ -18,8 +16,13 @@ pub struct TrajectoryArgs {
     trajectory: Option<PathBuf>,
     /// Root trajectory along a smooth curve through points (cm) "x,z; x,z; ..." or "x,y,z; ...", from the first frame to the last; without y the root
     /// keeps the heights that it would have had. Keyframes are moved onto it
-    #[arg(long, value_name = "POINTS", value_parser = points::parse, allow_hyphen_values = true, conflicts_with = "trajectory")]
-    trajectory_through: Option<points::Points>,
+    #[arg(
+        long,
+        value_name = "POINTS",
+        allow_hyphen_values = true,
+        conflicts_with = "trajectory"
+    )]
+    trajectory_through: Option<Points>,
     /// How the curve through points is timed
     #[arg(long, value_enum, requires = "trajectory_through", default_value_t)]
     timing: Timing,
@@ -67,14 +70,18 @@ impl TrajectoryArgs {
             }
         }
         let trajectory = if let Some(path) = &self.trajectory {
-            table::read(path, &["x", "y", "z"], request.frames())?
+            read_trajectory(path, request.frames())?
         } else if let Some(points) = &self.trajectory_through {
             if self.timing == Timing::Clip && keyframes.motion().is_none() {
                 anyhow::bail!(
                     "--timing clip takes the speed of --motion; give --motion, or --timing constant"
                 );
             }
-            self.drawn(points, &request)
+            let speed = match self.timing {
+                Timing::Constant => Speed::Constant,
+                Timing::Clip => request.own_speed(),
+            };
+            request.trajectory_through(points, &speed)
         } else {
             request.root_trajectory.clone()
         };
@@ -91,30 +98,5 @@ impl TrajectoryArgs {
             request = request.raised(height);
         }
         Ok((request, warnings))
-    }
-
-    fn drawn(&self, points: &points::Points, request: &SequenceRequest) -> ndarray::Array2<f64> {
-        let old = &request.root_trajectory;
-        let speed = match self.timing {
-            Timing::Constant => Speed::Constant,
-            Timing::Clip => Speed::Like(
-                (1..old.nrows())
-                    .map(|frame| {
-                        let (x, z) = (0, 2);
-                        let step = |axis: usize| old[[frame, axis]] - old[[frame - 1, axis]];
-                        step(x).hypot(step(z))
-                    })
-                    .collect(),
-            ),
-        };
-        let path: Vec<DVec3> = smooth_curve(&points.points, old.nrows(), &speed);
-        let mut trajectory = old.clone();
-        for (mut row, point) in trajectory.rows_mut().into_iter().zip(path) {
-            (row[0], row[2]) = (point.x, point.z);
-            if points.with_heights {
-                row[1] = point.y;
-            }
-        }
-        trajectory
     }
 }

@@ -3,6 +3,8 @@
 //! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as JSON. Nothing that a user wrote becomes
 //! markup: names are escaped in the page's title, and inside the JSON no `<` is left that could end its element.
 
+mod generated;
+mod of_request;
 mod page;
 mod positions;
 
@@ -16,6 +18,9 @@ use crate::motion::placement::{vector, world_positions};
 use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
 use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
+
+pub use generated::{PageError, generated_page};
+pub use of_request::RequestMotion;
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;

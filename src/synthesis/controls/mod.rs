@@ -3,13 +3,19 @@
 //! Every control is a method of [`SequenceRequest`] that takes a request and gives another, so they combine in any order that makes
 //! sense: times first, then another trajectory, then turns, scales and heights, then velocity factors.
 
+mod csv;
 mod curve;
+mod gains;
+mod points;
 mod timing;
 mod trajectory;
 mod velocity;
 
+pub use self::csv::{TableError, read_trajectory, read_velocity_factors};
 pub(crate) use curve::timed_curve;
 pub use curve::{Speed, smooth_curve};
+pub use gains::Gains;
+pub use points::Points;
 
 use glam::DVec3;
 use ndarray::{Array2, ArrayView2};

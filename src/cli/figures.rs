@@ -1,0 +1,104 @@
+//! `keydance figures`: reads a run's folder and a data folder, writes the paper's figures with captions and numbers.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::threads::Threads;
+use crate::data::Dataset;
+use crate::report::figures::index;
+use crate::report::figures::pan2021::{Cast, Choice, Stage};
+use crate::run::{Subject, replace_file};
+
+/// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
+///
+/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a test clip: by default the one in the middle of the first clip by name. Captions and CSV files give means
+/// over such a transition of every test clip that is long enough. A model follows a control where it gives at least a third of the change that is asked
+/// for; the captions of figures 6 to 9 say so where it does not. Motion is shown as the model predicts it, neither bent onto the keyframes nor cleaned up.
+#[derive(Debug, Args)]
+pub struct FiguresArgs {
+    /// Folder of a run, or the config of a model that needs no training
+    #[arg(value_name = "RUN_DIR_OR_CONFIG")]
+    run: PathBuf,
+    /// Folder of BVH files; the run's config says which of them test
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder for the figures
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// A run to set beside in figures 11 and 12; may be repeated
+    #[arg(long, value_name = "RUN_DIR_OR_CONFIG")]
+    compare: Vec<PathBuf>,
+    /// Test clip to show, by its file name [default: the first by name]
+    #[arg(long, value_name = "NAME")]
+    clip: Option<String>,
+    /// First keyframe in that clip [default: the transition is in its middle]
+    #[arg(long, value_name = "FRAME")]
+    start: Option<usize>,
+    /// Frames from keyframe to keyframe
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    length: u16,
+    /// Show the transition in the motion viewer, too: one HTML page
+    #[arg(long, value_name = "OUT.html")]
+    viewer: Option<PathBuf>,
+    /// Take other data than the run was trained on
+    #[arg(long)]
+    other_data: bool,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// # Errors
+/// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is written then. A file cannot be written.
+pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
+    let subject = Subject::open(&args.run, &[])?;
+    let compared: Vec<Subject> = args
+        .compare
+        .iter()
+        .map(|path| Subject::open(path, &[]))
+        .collect::<Result<_, _>>()?;
+    let cast = Cast::new(subject, compared)?;
+    let dataset = Dataset::load(&args.data, &cast.subject().config.data)?;
+    if !args.other_data {
+        cast.check_data(&dataset, &args.data)?;
+    }
+    let stage = Stage::new(
+        &dataset.test,
+        &Choice {
+            length: args.length.into(),
+            clip: args.clip.as_deref(),
+            start: args.start,
+        },
+    )?;
+    let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
+    let page = match &args.viewer {
+        Some(_) => Some(cast.page(&stage)?),
+        None => None,
+    };
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("{} cannot be created", args.out.display()))?;
+    for figure in &figures {
+        figure.write(&args.out)?;
+    }
+    let about = format!(
+        "{} on {} test clips of the data with digest {}.",
+        cast.subject().what,
+        dataset.test.len(),
+        dataset.digest
+    );
+    replace_file(
+        &args.out.join("index.md"),
+        index(&figures, &about).as_bytes(),
+    )?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+        replace_file(path, page.as_bytes())?;
+    }
+    let mut out = std::io::stdout();
+    for figure in &figures {
+        writeln!(out, "{}", figure.caption)?;
+    }
+    writeln!(out, "{}", args.out.display())?;
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between them as BVH.
+
+mod keyframes;
+mod trajectory;
+mod velocity;
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::notice::notice;
+use crate::motion::Clip;
+use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
+use crate::report::viewer::generated_page;
+use crate::run::{Subject, replace_file, write_json};
+use crate::synthesis::keyframes::Keyframes;
+use crate::synthesis::{Summary, SynthesisOptions, control_warnings, synthesise};
+use keyframes::KeyframeArgs;
+use trajectory::TrajectoryArgs;
+use velocity::VelocityArgs;
+
+/// Generate the dance between keyframes and write it as BVH
+///
+/// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a file at another rate is resampled first, so frame 120 of the
+/// file's own 120 a second is frame 30 here. The result passes through every keyframe. Keyframes of several dancers are put onto the first one's bones.
+#[derive(Debug, Args)]
+pub struct GenerateArgs {
+    /// Folder of a run, or the config of a model that needs no training
+    #[arg(value_name = "RUN_DIR_OR_CONFIG")]
+    run: PathBuf,
+    #[command(flatten)]
+    keyframes: KeyframeArgs,
+    /// Where to write the motion
+    #[arg(long, value_name = "FILE.bvh")]
+    out: PathBuf,
+    #[command(flatten)]
+    trajectory: TrajectoryArgs,
+    #[command(flatten)]
+    velocity: VelocityArgs,
+    /// Pin the feet where the model predicts contact
+    #[arg(long)]
+    foot_cleanup: bool,
+    /// Show the motion beside interpolation and, where keyframes come from --motion at their own distances, the recorded motion: one HTML page
+    /// that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    viewer: Option<PathBuf>,
+    /// Write what is printed here, too, as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Override a key of the config; of a run's model only model.velocity_refinement, such as model.velocity_refinement=false; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// # Errors
+/// The run, a file or a control cannot be used, or they do not fit each other; nothing is written then. A file cannot be written.
+pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
+    let subject = Subject::open(&args.run, &args.set)?;
+    let keyframes = Keyframes::read(&args.keyframes.choice(), &subject.config.data)?;
+    let request = keyframes.request(&args.keyframes.length)?;
+    let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
+    let request = args.velocity.apply(request, &keyframes)?;
+    warnings.extend(control_warnings(&request, subject.ranges.as_ref()));
+    for warning in &warnings {
+        notice(format_args!("warning: {warning}"));
+    }
+    let options = SynthesisOptions {
+        foot_cleanup: args.foot_cleanup,
+    };
+    let name = args.out.file_name().unwrap_or_default().to_string_lossy();
+    let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
+    let document = document(&sequence.clip, keyframes.channels())?;
+    let page = match &args.viewer {
+        Some(_) => Some(generated_page(
+            &subject, &keyframes, &request, &sequence, &options,
+        )?),
+        None => None,
+    };
+    bvh::write(&args.out, &document)?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+        replace_file(path, page.as_bytes())?;
+    }
+    let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
+    if let Some(path) = &args.json {
+        write_json(path, &summary)?;
+    }
+    writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
+    Ok(())
+}
+
+/// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.
+fn document(clip: &Clip, channels: Option<&[Vec<Channel>]>) -> anyhow::Result<Bvh> {
+    let channels = match channels {
+        Some(channels) => channels.to_vec(),
+        None => channel_layout(clip, [Axis::Z, Axis::X, Axis::Y]),
+    };
+    Bvh::from_clip(clip, channels).context("the motion cannot be written")
+}

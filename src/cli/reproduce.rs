@@ -1,0 +1,197 @@
+//! `keydance reproduce`: reads a folder of configs and a data folder, trains and evaluates each, writes tables, figures and a manifest.
+
+use std::collections::HashSet;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::bail;
+use clap::Args;
+
+use super::notice::notice;
+use super::progress::Progress;
+use super::stop::{Stop, interrupted, quote};
+use super::threads::Threads;
+use super::train;
+use super::watched::evaluate_watched;
+use crate::data::DanceClip;
+use crate::evaluation::{self, EvaluationError, Protocol, paper};
+use crate::experiment::{Ending, Observer, ReproduceError, Reproduction, Row, Seeds, rows};
+use crate::models::transition::TransitionModel;
+use crate::training::{Resumed, StepReport, Trainer, TrainingError};
+
+/// Train and evaluate every config of a folder, and write tables, figures and a manifest
+///
+/// Trains every config of a folder that is not trained yet, evaluates it on the test clips and writes tables 2 to 4 with the paper's
+/// value, ours and the difference, figures and a manifest.
+///
+/// A row whose results are in OUT is done. A row whose run is in RUNS goes on from its newest checkpoint, also after a kill; the end
+/// is the same to the bit as without the break. Tables are written again after every row; rows that are missing show "—".
+#[derive(Debug, Args)]
+pub struct ReproduceArgs {
+    /// Folder of configs, such as experiments/pan2021
+    #[arg(value_name = "CONFIGS")]
+    configs: PathBuf,
+    /// Folder of BVH files
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder for the results, small files: tables, figures, manifest, and a folder for each row
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folder for the runs, large: checkpoints, logs and weights [default: runs/ and the name of OUT]
+    #[arg(long, value_name = "DIR")]
+    runs: Option<PathBuf>,
+    /// Config of overrides for all rows alike, such as experiments/budgets/pan2021.toml
+    #[arg(long, value_name = "FILE")]
+    budget: Option<PathBuf>,
+    /// Override a key of all configs, such as schedule.fraction=0.005; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Train and evaluate these models only; the tables keep what there is of the others
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Train a model from several seeds, such as whole_model=1,2,3, and show the spread; may be repeated
+    #[arg(long, value_name = "NAME=SEEDS", value_parser = parse_seeds)]
+    seeds: Vec<Seeds>,
+    /// Train nothing: evaluate the runs that are finished and write the tables
+    #[arg(long)]
+    no_training: bool,
+    /// Rows to train at the same time, the threads shared among them; no number in the result depends on it
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    jobs: u16,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+fn parse_seeds(text: &str) -> Result<Seeds, String> {
+    let expected = || "expected NAME=SEED,SEED,..., such as whole_model=1,2,3".to_string();
+    let (name, list) = text.split_once('=').ok_or_else(expected)?;
+    let seeds = list.split(',').map(|seed| seed.trim().parse().ok());
+    let seeds: Vec<u64> = seeds.collect::<Option<_>>().ok_or_else(expected)?;
+    if seeds.iter().collect::<HashSet<_>>().len() != seeds.len() {
+        return Err(format!("names a seed twice; {}", expected()));
+    }
+    Ok(Seeds {
+        name: name.trim().into(),
+        seeds,
+    })
+}
+
+/// # Errors
+/// Configs or data cannot be used; results or a run are of another config or other data; a training diverged (the other rows are
+/// trained all the same); a file cannot be written.
+pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
+    let order = paper::ROWS.map(|row| row.name);
+    let budget = args.budget.as_deref();
+    let rows = rows::read(&args.configs, budget, &args.set, &args.seeds, &order)?;
+    let chosen = rows::chosen(&rows, &args.only, &args.configs)?;
+    let runs = match (&args.runs, args.out.file_name()) {
+        (Some(runs), _) => runs.clone(),
+        (None, Some(name)) => Path::new("runs").join(name),
+        (None, None) => bail!(
+            "--out {} has no name for a folder of runs; give --runs",
+            args.out.display()
+        ),
+    };
+    let dataset = rows::dataset(&rows, &args.data)?;
+    let terminal = Terminal {
+        alone: args.jobs == 1,
+        stop: Stop::on_signal()?,
+    };
+    let reproduction = Reproduction {
+        rows: &rows,
+        chosen: &chosen,
+        dataset: &dataset,
+        out: &args.out,
+        runs: &runs,
+        threads: args.threads.shared(args.jobs).count(),
+        jobs: args.jobs.into(),
+        no_training: args.no_training,
+        observer: &terminal,
+    };
+    let ending = reproduction.run().map_err(|error| match error {
+        // By itself: whether the output is closed is seen from its kind.
+        ReproduceError::Output(error) => error.into(),
+        other => anyhow::Error::new(other),
+    })?;
+    match ending {
+        Ending::Finished => {
+            writeln!(io::stdout(), "{}", args.out.display())?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Ending::Stopped => {
+            notice(format_args!(
+                "stopped and saved; go on with\n  {}",
+                same_command()
+            ));
+            Ok(interrupted())
+        }
+        Ending::Diverged(error) => Err(anyhow::Error::new(error).context("a training diverged")),
+    }
+}
+
+/// Says on the terminal how it goes, and stops on Ctrl-C.
+struct Terminal {
+    /// Whether there is one job only, which may draw bars.
+    alone: bool,
+    stop: Stop,
+}
+
+impl Observer for Terminal {
+    fn row(&self, row: &Row, number: usize, of: usize) -> io::Result<()> {
+        writeln!(io::stdout(), "== {} ({number} of {of})", row.folder)
+    }
+
+    fn note(&self, note: &str) -> io::Result<()> {
+        writeln!(io::stdout(), "{note}")
+    }
+
+    fn warning(&self, warning: &str) {
+        notice(format_args!("warning: {warning}"));
+    }
+
+    fn diverged(&self, row: &Row, error: &TrainingError) {
+        notice(format_args!("error: {}: {error}", row.folder));
+    }
+
+    fn training(&self, trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
+        train::describe(trainer, threads)
+    }
+
+    fn steps(
+        &self,
+        row: &Row,
+        trainer: &Trainer<'_>,
+        resumed: &Resumed,
+    ) -> io::Result<Box<dyn FnMut(&StepReport)>> {
+        train::goes_on(resumed)?;
+        let (schedule, before) = (trainer.schedule(), trainer.frame_steps_done());
+        let mut progress = match self.alone {
+            true => Progress::new(schedule, before),
+            false => Progress::lines(format!("{}: ", row.folder), schedule, before),
+        };
+        Ok(Box::new(move |report| progress.step(report)))
+    }
+
+    fn evaluate(
+        &self,
+        protocol: &Protocol,
+        model: &dyn TransitionModel,
+        clips: &[DanceClip],
+    ) -> Result<evaluation::Outcome, EvaluationError> {
+        match self.alone {
+            true => evaluate_watched(protocol, model, clips),
+            false => protocol.evaluate(model, clips),
+        }
+    }
+
+    fn stop_asked(&self) -> bool {
+        self.stop.is_asked()
+    }
+}
+
+/// The command as it was given.
+fn same_command() -> String {
+    let words = std::env::args().skip(1).map(|word| quote(&word));
+    format!("keydance {}", words.collect::<Vec<_>>().join(" "))
+}

@@ -1,0 +1,188 @@
+//! A model's scores in a folder: `evaluation.json`, and `evaluation_data.json` that says on what they were measured. Scores on other
+//! clips than the test clips have files of their own, such as `evaluation_validation.json`.
+
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::scores::Evaluation;
+use crate::data::{DanceClip, DataPart, Dataset, EmptyPart};
+use crate::report::thousands;
+use crate::run::{FileError, write_json};
+
+/// Why a folder's scores cannot be read; each says how to get some.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    #[error("{} has no {name}; to get one, {}", folder.display(), remedy(folder))]
+    Missing { folder: PathBuf, name: &'static str },
+    #[error(
+        "{} holds no scores on test clips; to get some, {}: {cause}",
+        folder.join(name).display(),
+        remedy(folder)
+    )]
+    Damaged {
+        folder: PathBuf,
+        name: &'static str,
+        cause: serde_json::Error,
+    },
+    #[error(
+        "{} are scores on {part} clips, not on the test clips; to get those, {}",
+        folder.join(name).display(),
+        remedy(folder)
+    )]
+    OtherPart {
+        folder: PathBuf,
+        name: &'static str,
+        part: DataPart,
+    },
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// What a model was evaluated on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluatedData {
+    /// Which part of the data set.
+    #[serde(default)]
+    pub part: DataPart,
+    #[serde(alias = "test_clips")]
+    pub clips: usize,
+    #[serde(alias = "test_frames")]
+    pub frames: usize,
+    /// Digest of the whole data set, see [`Dataset::digest`].
+    pub data_digest: String,
+    /// Version of keydance that evaluated, and its commit where it was built in a git checkout.
+    pub version: String,
+    pub commit: Option<String>,
+}
+
+impl EvaluatedData {
+    /// # Errors
+    /// The data set has no such clips.
+    pub fn of(dataset: &Dataset, part: DataPart) -> Result<Self, EmptyPart> {
+        let clips = part.of(dataset)?;
+        Ok(Self {
+            part,
+            clips: clips.len(),
+            frames: clips.iter().map(DanceClip::frames).sum(),
+            data_digest: dataset.digest.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
+        })
+    }
+
+    /// What the scores were measured on, for a caption.
+    pub fn caption(&self) -> String {
+        format!(
+            "{} test clips, {} frames, of the data with digest {}",
+            self.clips,
+            thousands(self.frames as u64),
+            self.data_digest
+        )
+    }
+}
+
+/// Scores and what they were measured on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvaluationRecord {
+    pub evaluation: Evaluation,
+    pub data: EvaluatedData,
+}
+
+/// The JSON of scores. Those on the test clips are no more than the scores.
+#[derive(Serialize)]
+struct Scores<'a> {
+    #[serde(skip_serializing_if = "DataPart::is_test")]
+    clips: DataPart,
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+}
+
+impl EvaluationRecord {
+    /// Names of the files: scores, and what they were measured on.
+    pub fn files(part: DataPart) -> [&'static str; 2] {
+        match part {
+            DataPart::Test => ["evaluation.json", "evaluation_data.json"],
+            DataPart::Validation => [
+                "evaluation_validation.json",
+                "evaluation_validation_data.json",
+            ],
+            DataPart::Train => ["evaluation_train.json", "evaluation_train_data.json"],
+        }
+    }
+
+    /// Writes the scores as JSON, which says on which clips unless on the test clips.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_scores(&self, path: &Path) -> Result<(), FileError> {
+        let scores = Scores {
+            clips: self.data.part,
+            evaluation: &self.evaluation,
+        };
+        write_json(path, &scores)
+    }
+
+    /// Whether a folder has scores on the test clips, sound or not.
+    pub fn is_in(folder: &Path) -> bool {
+        let [scores, _] = Self::files(DataPart::Test);
+        folder.join(scores).exists()
+    }
+
+    /// Writes both files into a folder that exists.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), FileError> {
+        let [scores, data] = Self::files(self.data.part);
+        write_json(&folder.join(data), &self.data)?;
+        self.write_scores(&folder.join(scores))
+    }
+
+    /// Reads what [`EvaluationRecord::write`] wrote of the test clips.
+    ///
+    /// # Errors
+    /// The folder has no such scores (the error says how to get them), or a file is damaged.
+    pub fn read(folder: &Path) -> Result<Self, RecordError> {
+        let [scores, data] = Self::files(DataPart::Test);
+        let record = Self {
+            evaluation: read_json(folder, scores)?,
+            data: read_json(folder, data)?,
+        };
+        if !record.data.part.is_test() {
+            return Err(RecordError::OtherPart {
+                folder: folder.into(),
+                name: scores,
+                part: record.data.part,
+            });
+        }
+        Ok(record)
+    }
+}
+
+fn read_json<T: DeserializeOwned>(folder: &Path, name: &'static str) -> Result<T, RecordError> {
+    let path = folder.join(name);
+    if !path.exists() {
+        return Err(RecordError::Missing {
+            folder: folder.into(),
+            name,
+        });
+    }
+    let text = std::fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
+    serde_json::from_str(&text).map_err(|cause| RecordError::Damaged {
+        folder: folder.into(),
+        name,
+        cause,
+    })
+}
+
+/// How a folder gets scores on the test clips.
+fn remedy(folder: &Path) -> String {
+    format!(
+        "run `keydance evaluate {} --data DIR` (a config: `keydance evaluate CONFIG --data DIR --out {}`)",
+        folder.display(),
+        folder.display()
+    )
+}

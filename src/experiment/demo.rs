@@ -1,0 +1,77 @@
+//! What the demo generates and trains.
+
+use super::{ConfigError, ExperimentConfig, ValueError};
+use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
+use crate::data::{DataError, Dataset};
+
+const EXPERIMENT: &str = include_str!("../../experiments/demo.toml");
+
+/// Why there is nothing to generate or to train.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoSettingsError {
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error("--fraction is not a share of the schedule")]
+    Fraction(#[source] ValueError),
+    #[error(transparent)]
+    Choreography(#[from] ChoreographyError),
+    #[error(transparent)]
+    Data(#[from] DataError),
+}
+
+/// Clips and training of a demo.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DemoSettings {
+    pub choreography: ChoreographyConfig,
+    pub experiment: ExperimentConfig,
+}
+
+impl DemoSettings {
+    /// The demo's settings; `reduced` to about a seventh of the training, and `fraction` in place of the schedule's own.
+    ///
+    /// # Errors
+    /// The fraction is not a share.
+    pub fn new(reduced: bool, fraction: Option<f64>) -> Result<Self, DemoSettingsError> {
+        let mut experiment = ExperimentConfig::parse(EXPERIMENT, "experiments/demo.toml")?;
+        // 24 clips of half a minute: four of each style.
+        let mut choreography = ChoreographyConfig {
+            clips: 24,
+            frames_per_clip: 900,
+            seed: 1,
+        };
+        if reduced {
+            (choreography.clips, choreography.frames_per_clip) = (12, 450);
+            experiment.schedule.fraction = 0.1;
+        }
+        if let Some(fraction) = fraction {
+            experiment.schedule.fraction = fraction;
+            experiment.validate().map_err(DemoSettingsError::Fraction)?;
+        }
+        Ok(Self {
+            choreography,
+            experiment,
+        })
+    }
+
+    /// The generated clips, split as the experiment says.
+    ///
+    /// # Errors
+    /// The clips cannot be generated or measured.
+    pub fn dataset(&self) -> Result<Dataset, DemoSettingsError> {
+        let clips = generate(&self.choreography)?;
+        let clips = clips.into_iter().map(|generated| generated.clip).collect();
+        Ok(Dataset::from_clips(clips, &self.experiment.data)?)
+    }
+
+    /// What scores on a data set of these settings were measured on, for the tables' caption.
+    pub fn caption(&self, dataset: &Dataset) -> String {
+        let choreography = &self.choreography;
+        format!(
+            "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not comparable",
+            dataset.test.len(),
+            choreography.clips,
+            choreography.frames_per_clip,
+            choreography.seed
+        )
+    }
+}

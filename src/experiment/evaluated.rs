@@ -1,0 +1,96 @@
+//! Runs' folders that `keydance evaluate` has been through, side by side.
+
+use std::path::{Path, PathBuf};
+
+use super::ExperimentConfig;
+use crate::evaluation::{EvaluationRecord, RecordError, TableRow};
+use crate::report::{NO_TRAINING, schedule_note};
+use crate::run::{Manifest, RunFolder};
+use crate::training::TrainingError;
+
+/// Why runs' scores do not stand in one table.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluatedError {
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Run(#[from] TrainingError),
+    /// Both as what was measured on what.
+    #[error("scores of different data do not stand in one table: {0}, but {1}")]
+    OtherData(String, String),
+}
+
+/// A run with its scores.
+pub struct EvaluatedRun {
+    folder: PathBuf,
+    config: ExperimentConfig,
+    /// None where nothing was trained.
+    manifest: Option<Manifest>,
+    pub record: EvaluationRecord,
+}
+
+impl EvaluatedRun {
+    /// The runs of folders that were evaluated on the same clips.
+    ///
+    /// # Errors
+    /// A folder has no scores, a file of it is damaged, or the scores are of different data.
+    pub fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, EvaluatedError> {
+        let runs: Vec<Self> = folders
+            .iter()
+            .map(|folder| Self::read(folder))
+            .collect::<Result<_, _>>()?;
+        for pair in runs.windows(2) {
+            if !pair[0].on_the_data_of(&pair[1]) {
+                return Err(EvaluatedError::OtherData(
+                    pair[0].measured(),
+                    pair[1].measured(),
+                ));
+            }
+        }
+        Ok(runs)
+    }
+
+    fn read(folder: &Path) -> Result<Self, EvaluatedError> {
+        let run = RunFolder::open(folder);
+        let record = EvaluationRecord::read(folder)?;
+        Ok(Self {
+            config: run.config()?,
+            manifest: run.manifest()?,
+            record,
+            folder: folder.into(),
+        })
+    }
+
+    /// Its row in the tables.
+    pub fn row(&self) -> TableRow {
+        TableRow {
+            name: self.config.name.clone(),
+            seed: self.manifest.as_ref().map(|manifest| manifest.seed),
+            evaluation: Some(self.record.evaluation.clone()),
+            schedule_note: self.manifest.as_ref().map_or_else(
+                || NO_TRAINING.into(),
+                |manifest| schedule_note(&self.config, manifest),
+            ),
+        }
+    }
+
+    /// Scores stand side by side only if they were measured on the same windows.
+    fn on_the_data_of(&self, other: &Self) -> bool {
+        let (ours, theirs) = (&self.record, &other.record);
+        ours.evaluation.windows == theirs.evaluation.windows
+            && (ours.data.clips, ours.data.frames) == (theirs.data.clips, theirs.data.frames)
+            && ours.data.data_digest == theirs.data.data_digest
+    }
+
+    fn measured(&self) -> String {
+        let data = &self.record.data;
+        format!(
+            "{} on {} test clips ({} frames, windows by length {:?}) of data with digest {}",
+            self.folder.display(),
+            data.clips,
+            data.frames,
+            self.record.evaluation.windows,
+            data.data_digest
+        )
+    }
+}

@@ -1,0 +1,318 @@
+//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them all.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::ThreadPoolBuilder;
+
+use super::ReproduceError;
+use super::report::{self, Reported};
+use super::results::RowResults;
+use super::rows::Row;
+use crate::data::{DanceClip, DataPart, Dataset};
+use crate::evaluation::{self, Evaluation, EvaluationError, Protocol};
+use crate::models::transition::TransitionModel;
+use crate::run::{RunFolder, RunState};
+use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
+
+/// Is told how a reproduction goes, by several threads where several rows are trained at the same time, and may stop it.
+///
+/// An error of a method ends the reproduction: what it says cannot be written any more.
+pub trait Observer: Sync {
+    /// Row `number` of `of`, counted from 1, begins.
+    fn row(&self, row: &Row, number: usize, of: usize) -> io::Result<()>;
+
+    /// What became of the row at hand without any work.
+    fn note(&self, note: &str) -> io::Result<()>;
+
+    /// Something that the user should know of.
+    fn warning(&self, warning: &str);
+
+    /// The training of a row diverged; the other rows go on.
+    fn diverged(&self, row: &Row, error: &TrainingError);
+
+    /// A training is about to begin or to go on.
+    fn training(&self, trainer: &Trainer<'_>, threads: usize) -> io::Result<()>;
+
+    /// A training goes on after what `resumed` says; the result is told each of its steps.
+    fn steps(
+        &self,
+        row: &Row,
+        trainer: &Trainer<'_>,
+        resumed: &Resumed,
+    ) -> io::Result<Box<dyn FnMut(&StepReport)>>;
+
+    /// Evaluates a model as `protocol` says: whoever shows how far that is wraps the model.
+    fn evaluate(
+        &self,
+        protocol: &Protocol,
+        model: &dyn TransitionModel,
+        clips: &[DanceClip],
+    ) -> Result<evaluation::Outcome, EvaluationError> {
+        protocol.evaluate(model, clips)
+    }
+
+    /// Whether to stop after the step at hand.
+    fn stop_asked(&self) -> bool;
+}
+
+/// What is trained and evaluated, on what, and where it goes.
+pub struct Reproduction<'a> {
+    /// All rows of the tables.
+    pub rows: &'a [Row],
+    /// Those to train and evaluate; the tables keep what there is of the others.
+    pub chosen: &'a [&'a Row],
+    pub dataset: &'a Dataset,
+    /// Folder for the results.
+    pub out: &'a Path,
+    /// Folder for the runs.
+    pub runs: &'a Path,
+    /// Threads of one row.
+    pub threads: usize,
+    /// Rows that are trained at the same time.
+    pub jobs: usize,
+    /// Only runs that are finished are evaluated.
+    pub no_training: bool,
+    pub observer: &'a dyn Observer,
+}
+
+/// How a reproduction ended.
+#[derive(Debug)]
+pub enum Ending {
+    /// All that was asked for is done.
+    Finished,
+    /// The observer asked to stop; what was trained is saved.
+    Stopped,
+    /// Trainings diverged, this one last; all other rows are done.
+    Diverged(TrainingError),
+}
+
+/// How a row ended.
+enum RowOutcome {
+    Done,
+    /// Asked to stop, or not to train.
+    Left,
+    Diverged(TrainingError),
+}
+
+impl Reproduction<'_> {
+    /// Trains and evaluates what is left of the chosen rows, and writes the tables again after each.
+    ///
+    /// # Errors
+    /// Results or a run are of another config or other data; a file cannot be read or written; the observer has an error.
+    pub fn run(&self) -> Result<Ending, ReproduceError> {
+        DataPart::Test.of(self.dataset)?;
+        for row in self.rows {
+            self.check(row)?;
+        }
+        let line = Line {
+            reproduction: self,
+            next: AtomicUsize::new(0),
+            diverged: Mutex::new(None),
+        };
+        std::thread::scope(|scope| {
+            let jobs = (0..self.jobs).map(|_| scope.spawn(|| line.work()));
+            // All begin before one is waited for.
+            let jobs: Vec<_> = jobs.collect();
+            jobs.into_iter().try_for_each(|job| match job.join() {
+                Ok(result) => result,
+                Err(panic) => std::panic::resume_unwind(panic),
+            })
+        })?;
+        self.report()?;
+        let diverged = line
+            .diverged
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        Ok(match diverged {
+            _ if self.observer.stop_asked() => Ending::Stopped,
+            Some(error) => Ending::Diverged(error),
+            None => Ending::Finished,
+        })
+    }
+}
+
+/// Rows in a line, taken one after the other by the jobs.
+struct Line<'a> {
+    reproduction: &'a Reproduction<'a>,
+    /// The next of `chosen`; all are taken once a job has failed.
+    next: AtomicUsize,
+    /// The last training that diverged; held while the tables are written.
+    diverged: Mutex<Option<TrainingError>>,
+}
+
+impl Line<'_> {
+    /// Finishes row after row until none is left or the user asks to stop.
+    fn work(&self) -> Result<(), ReproduceError> {
+        let reproduction = self.reproduction;
+        let chosen = reproduction.chosen;
+        while !reproduction.observer.stop_asked() {
+            let index = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(row) = chosen.get(index) else {
+                break;
+            };
+            reproduction.observer.row(row, index + 1, chosen.len())?;
+            let outcome = reproduction.finish(row).and_then(|outcome| {
+                let mut diverged = self.diverged.lock().unwrap_or_else(PoisonError::into_inner);
+                match outcome {
+                    RowOutcome::Done => reproduction.report()?,
+                    RowOutcome::Diverged(error) => {
+                        reproduction.observer.diverged(row, &error);
+                        *diverged = Some(error);
+                    }
+                    RowOutcome::Left => {}
+                }
+                Ok(())
+            });
+            if outcome.is_err() {
+                self.next.store(chosen.len(), Ordering::Relaxed);
+                return outcome;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Reproduction<'_> {
+    fn run_of(&self, row: &Row) -> RunFolder {
+        RunFolder::open(&self.runs.join(&row.folder))
+    }
+
+    /// Refuses results and runs of another config or other data, before anything is trained.
+    fn check(&self, row: &Row) -> Result<(), ReproduceError> {
+        RowResults::of(row, self.out).read(row, self.dataset)?;
+        let run = self.run_of(row);
+        if !run.config_path().exists() {
+            // The model, the schedule and the validation are refused here, not when hours of other rows are over.
+            if row.is_trained() && !self.no_training {
+                Trainer::new(row.config.clone(), self.dataset, 1).map_err(|source| {
+                    ReproduceError::Row {
+                        row: row.folder.clone(),
+                        source,
+                    }
+                })?;
+            }
+            return Ok(());
+        }
+        let manifest = run.manifest()?;
+        let config = run.config()?;
+        let differences = match &manifest {
+            // Nothing of it is trained any more.
+            Some(manifest) if manifest.state == RunState::Finished => {
+                config.training_differences(&row.config)?
+            }
+            _ => config.differences(&row.config)?,
+        };
+        if !differences.is_empty() {
+            return Err(TrainingError::OtherConfig {
+                path: run.config_path(),
+                differences,
+            }
+            .into());
+        }
+        match manifest {
+            Some(manifest) if manifest.data_digest != self.dataset.digest => {
+                Err(TrainingError::OtherData {
+                    path: run.path().into(),
+                    saved: manifest.data_digest,
+                    found: self.dataset.digest.clone(),
+                }
+                .into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Trains and evaluates what is left of a row.
+    fn finish(&self, row: &Row) -> Result<RowOutcome, ReproduceError> {
+        let results = RowResults::of(row, self.out);
+        if results.read(row, self.dataset)?.is_some() {
+            let folder = self.out.join(&row.folder);
+            self.observer
+                .note(&format!("done, see {}", folder.display()))?;
+            return Ok(RowOutcome::Done);
+        }
+        let untrained = row
+            .config
+            .model
+            .untrained(row.config.data.contact_threshold);
+        if let Some(model) = untrained {
+            let evaluation = self.evaluate(model.as_ref())?;
+            results.write(row, None, evaluation, self.dataset)?;
+            return Ok(RowOutcome::Done);
+        }
+        let run = self.run_of(row);
+        let finished = run
+            .manifest()?
+            .is_some_and(|manifest| manifest.state == RunState::Finished);
+        if !finished {
+            if self.no_training {
+                self.observer.note("not trained yet")?;
+                return Ok(RowOutcome::Left);
+            }
+            match self.train(row) {
+                Ok(Outcome::Finished) => {}
+                Ok(Outcome::Stopped) => return Ok(RowOutcome::Left),
+                Err(ReproduceError::Training(error @ TrainingError::NonFinite { .. })) => {
+                    return Ok(RowOutcome::Diverged(error));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let evaluation = self.evaluate(&run.trained_model(&row.config)?)?;
+        results.write(row, Some(&run), evaluation, self.dataset)?;
+        Ok(RowOutcome::Done)
+    }
+
+    fn train(&self, row: &Row) -> Result<Outcome, ReproduceError> {
+        let mut trainer = Trainer::new(row.config.clone(), self.dataset, self.threads)?;
+        self.observer.training(&trainer, self.threads)?;
+        let run = RunFolder::resume(&self.runs.join(&row.folder), &row.config)?;
+        let resumed = trainer.resume(&run)?;
+        let mut step = self.observer.steps(row, &trainer, &resumed)?;
+        let outcome = trainer.run(Some(&run), &mut |report| {
+            step(report);
+            match self.observer.stop_asked() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        });
+        Ok(outcome?)
+    }
+
+    fn evaluate(&self, model: &dyn TransitionModel) -> Result<Evaluation, ReproduceError> {
+        let threads = self.threads;
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|cause| ReproduceError::Threads { threads, cause })?;
+        let protocol = Protocol::default();
+        let clips = &self.dataset.test;
+        let outcome = pool.install(|| self.observer.evaluate(&protocol, model, clips))?;
+        for skipped in &outcome.skipped {
+            self.observer.warning(&skipped.to_string());
+        }
+        Ok(outcome.evaluation)
+    }
+
+    /// Writes tables, figures and manifest from what there is.
+    fn report(&self) -> Result<(), ReproduceError> {
+        let reported: Vec<Reported<'_>> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let results = RowResults::of(row, self.out);
+                Ok(Reported {
+                    row,
+                    record: results.read(row, self.dataset)?,
+                    results,
+                    run: self.run_of(row),
+                })
+            })
+            .collect::<Result<_, ReproduceError>>()?;
+        report::write(self.out, &reported, &self.dataset.digest)
+    }
+}

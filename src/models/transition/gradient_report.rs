@@ -1,0 +1,166 @@
+//! The checks of a model's gradient in all the ways that it is trained, as text, and whether they pass.
+
+use std::fmt;
+
+use rayon::prelude::*;
+
+use super::Feed;
+use super::gradient_check::{GradientCase, GradientCheckConfig, GradientCheckError, check_model};
+use crate::autograd::check::{CheckReport, ParameterReport};
+use crate::models::ModelConfig;
+
+/// Largest error that passes.
+const TOLERANCE: f64 = 1e-5;
+/// Largest share of numbers that may stand at a kink.
+const MOST_KINKS: f64 = 0.02;
+/// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
+const TRANSITIONS: [usize; 2] = [12, 6];
+
+/// A check of each case that the model has; its `Display` is a table for each and a line on them all.
+pub struct GradientReport {
+    cases: Vec<(GradientCase, CheckReport)>,
+}
+
+/// Why a gradient does not pass.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GradientFault {
+    #[error("a gradient is wrong: its error {error:.1e} is above {TOLERANCE:.0e}")]
+    Wrong { error: f64 },
+    #[error(
+        "too little was compared: {kinks} of {drawn} numbers stand at a kink; another --seed may draw better ones"
+    )]
+    TooLittle { kinks: usize, drawn: usize },
+}
+
+impl GradientReport {
+    /// Checks the model with its own predictions fed and the truth, with dropout and without, on transitions of `frames` frames, or of
+    /// more and of fewer frames than two times m without a number.
+    ///
+    /// # Errors
+    /// The model has nothing to train, or an operation fails.
+    pub fn of(
+        model: &ModelConfig,
+        frames: Option<usize>,
+        config: GradientCheckConfig,
+    ) -> Result<Self, GradientCheckError> {
+        let cases = cases(frames);
+        let reports = cases
+            .par_iter()
+            .map(|&case| check_model(model, case, config))
+            .collect::<Result<Vec<_>, _>>()?;
+        let cases = cases.into_iter().zip(reports);
+        Ok(Self {
+            cases: cases
+                .filter_map(|(case, report)| Some((case, report?)))
+                .collect(),
+        })
+    }
+
+    /// Whether it passes.
+    ///
+    /// # Errors
+    /// An error is too large, or too few numbers could be compared.
+    pub fn verdict(&self) -> Result<(), GradientFault> {
+        let error = self.error();
+        if error > TOLERANCE {
+            return Err(GradientFault::Wrong { error });
+        }
+        let kinks = self.kinks();
+        let drawn = self.compared() + kinks;
+        if drawn == 0 || kinks as f64 > MOST_KINKS * drawn as f64 {
+            return Err(GradientFault::TooLittle { kinks, drawn });
+        }
+        Ok(())
+    }
+
+    fn error(&self) -> f64 {
+        let errors = self.cases.iter().map(|(_, report)| report.error());
+        errors.fold(0.0, f64::max)
+    }
+
+    fn compared(&self) -> usize {
+        self.cases.iter().map(|(_, report)| report.compared()).sum()
+    }
+
+    fn kinks(&self) -> usize {
+        self.cases.iter().map(|(_, report)| report.kinks()).sum()
+    }
+}
+
+impl fmt::Display for GradientReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (case, report) in &self.cases {
+            writeln!(f, "{}", title(case))?;
+            writeln!(f, "{}", table(report))?;
+        }
+        writeln!(
+            f,
+            "{} numbers compared, {} at kinks left out; largest error {:.1e}",
+            self.compared(),
+            self.kinks(),
+            self.error()
+        )
+    }
+}
+
+fn cases(frames: Option<usize>) -> Vec<GradientCase> {
+    let transitions = frames.map_or(TRANSITIONS.to_vec(), |frames| vec![frames]);
+    let mut cases = Vec::new();
+    for transition in transitions {
+        for feed in [Feed::Predictions, Feed::GroundTruth] {
+            for dropout in [false, true] {
+                cases.push(GradientCase {
+                    transition,
+                    feed,
+                    dropout,
+                });
+            }
+        }
+    }
+    cases
+}
+
+fn title(case: &GradientCase) -> String {
+    let feed = match case.feed {
+        Feed::GroundTruth => "the truth fed",
+        Feed::Predictions => "own predictions fed",
+    };
+    let dropout = if case.dropout { "on" } else { "off" };
+    format!("N = {}, {feed}, dropout {dropout}", case.transition)
+}
+
+/// A row for each part of the network: what its parameters' names begin with.
+fn table(report: &CheckReport) -> String {
+    let mut groups: Vec<(&str, Vec<&ParameterReport>)> = Vec::new();
+    for parameter in &report.parameters {
+        let group = parameter.parameter.split('.').next().unwrap_or_default();
+        match groups.iter_mut().find(|(name, _)| *name == group) {
+            Some((_, members)) => members.push(parameter),
+            None => groups.push((group, vec![parameter])),
+        }
+    }
+    let mut text = format!(
+        "  {:<28} {:>8} {:>6} {:>9}  {}\n",
+        "part", "compared", "kinks", "error", "where"
+    );
+    for (group, members) in groups {
+        let compared: usize = members.iter().map(|p| p.compared).sum();
+        let kinks: usize = members.iter().map(|p| p.kinks).sum();
+        let worst = members
+            .iter()
+            .filter_map(|p| p.worst.as_ref().map(|worst| (p, worst)))
+            .max_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
+        let (error, place) = match worst {
+            Some((parameter, worst)) => (
+                format!("{:.1e}", worst.error),
+                format!(
+                    "{}[{}]: gradient {:.8e}, difference {:.8e}",
+                    parameter.parameter, worst.index, worst.analytic, worst.numeric
+                ),
+            ),
+            None => ("-".into(), "-".into()),
+        };
+        text += &format!("  {group:<28} {compared:>8} {kinks:>6} {error:>9}  {place}\n");
+    }
+    text
+}

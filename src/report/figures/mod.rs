@@ -1,0 +1,65 @@
+//! The figures of papers: each an SVG with a caption, its numbers as CSV beside it. One file or folder a paper.
+
+mod error;
+mod numbers;
+pub mod pan2021;
+
+pub use error::FiguresError;
+pub use numbers::Numbers;
+pub use pan2021::lrp_figure;
+
+use std::path::Path;
+
+use super::MotionFigure;
+use crate::run::replace_file;
+
+/// A figure and the numbers behind it.
+pub struct Figure {
+    /// File name without extension, such as `figure_8`.
+    pub name: &'static str,
+    /// One line: what the figure shows and what was measured.
+    pub caption: String,
+    pub svg: String,
+    pub numbers: Numbers,
+}
+
+impl Figure {
+    /// A figure of dancers, with its caption.
+    ///
+    /// # Errors
+    /// There is nothing that could be drawn.
+    pub fn of_dancers(
+        name: &'static str,
+        drawing: MotionFigure,
+        numbers: Numbers,
+    ) -> Result<Self, FiguresError> {
+        Ok(Self {
+            name,
+            svg: drawing.svg()?,
+            caption: drawing.caption,
+            numbers,
+        })
+    }
+
+    /// Writes the SVG and the CSV.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), FiguresError> {
+        let path = |extension: &str| folder.join(self.name).with_extension(extension);
+        replace_file(&path("svg"), self.svg.as_bytes())?;
+        replace_file(&path("csv"), &self.numbers.csv()?)?;
+        Ok(())
+    }
+}
+
+/// The page that shows all figures with their captions, Markdown.
+pub fn index(figures: &[Figure], subject: &str) -> String {
+    let mut text = format!("# The paper's figures\n\n{subject}\n");
+    for Figure { name, caption, .. } in figures {
+        let caption = caption.replace('[', "(").replace(']', ")");
+        text +=
+            &format!("\n![{caption}]({name}.svg)\n\n{caption} Numbers: [{name}.csv]({name}.csv)\n");
+    }
+    text
+}

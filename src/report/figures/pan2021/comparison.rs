@@ -1,0 +1,135 @@
+//! Figures 11 and 12: several models on the same transition.
+
+use super::root::{root_distances, row_with_paths};
+use super::stage::{Generated, Stage, positions};
+use super::wording::mean;
+use crate::evaluation::{WindowScores, window_scores};
+use crate::models::transition::Transition;
+use crate::motion::placement::world_positions;
+use crate::report::figures::{Figure, FiguresError, Numbers};
+use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
+use ndarray::s;
+
+/// Frames from one drawn dancer to the next.
+const EVERY: usize = 10;
+
+/// What a model makes of the windows under the clips' own controls.
+pub struct Entry {
+    pub name: String,
+    /// Whether it stands in figure 11: a model without training, whose root is the target itself, does not unless it is what the figures are about.
+    pub drawn_with_root: bool,
+    pub generated: Vec<Generated>,
+}
+
+/// Figure 11: motions and root trajectories of the models.
+pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+    let mut numbers = Numbers::default();
+    let mut rows = Vec::new();
+    let mut said = Vec::new();
+    for entry in entries.iter().filter(|entry| entry.drawn_with_root) {
+        rows.push(row_with_paths(
+            &entry.name,
+            &entry.generated[0],
+            PathView::Above,
+        ));
+        let distances: Vec<f64> = entry
+            .generated
+            .iter()
+            .map(|generated| mean(&root_distances(generated)))
+            .collect();
+        numbers.add(&entry.name, "root_distance_mean", mean(&distances), "cm");
+        let shown = mean(&root_distances(&entry.generated[0]));
+        numbers.add(&entry.name, "root_distance_of_shown", shown, "cm");
+        said.push(format!("{} {:.1} cm", entry.name, mean(&distances)));
+    }
+    numbers.add("all windows", "windows", stage.windows().len() as f64, "");
+    let alone = if rows.len() < 2 {
+        " No other trained run was given to compare with (--compare)."
+    } else {
+        ""
+    };
+    let caption = format!(
+        "Figure 11. Motion and root trajectory of models on one transition, every {EVERY} frames; mean distance of the root from its target {}: {}.{alone}",
+        stage.measured_on(),
+        said.join(", ")
+    );
+    let title = format!("Figure 11: {}", stage.shown().describe());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
+    Figure::of_dancers("figure_11", drawing, numbers)
+}
+
+/// Figure 12: the recorded motion and every model's.
+pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+    let mut numbers = Numbers::default();
+    let recorded = positions(stage.shown().recorded.view());
+    let mut rows = vec![MotionRow::between_keyframes(
+        "Ground truth",
+        recorded,
+        false,
+    )];
+    let mut said = Vec::new();
+    for entry in entries {
+        rows.push(MotionRow::between_keyframes(
+            &entry.name,
+            entry.generated[0].drawn(),
+            true,
+        ));
+        let scores: Vec<WindowScores> = stage
+            .windows()
+            .iter()
+            .zip(&entry.generated)
+            .map(|(window, generated)| {
+                let frames = generated.frames.slice(s![1.., ..]).to_owned();
+                window_scores(window.recorded.view(), &Transition { frames })
+            })
+            .collect::<Result<_, _>>()
+            .map_err(|source| FiguresError::Scores {
+                model: entry.name.clone(),
+                source,
+            })?;
+        let of =
+            |score: fn(&WindowScores) -> f64| mean(&scores.iter().map(score).collect::<Vec<_>>());
+        let lrp = of(|scores| scores.body_position);
+        numbers.add(&entry.name, "LRP", lrp, "cm");
+        let factors = of(|scores| scores.velocity_factor);
+        numbers.add(&entry.name, "velocity_factor_error", factors, "cm/frame");
+        numbers.add(&entry.name, "root_distance", of(|scores| scores.root), "cm");
+        let missed: Vec<f64> = entry.generated.iter().map(keyframe_miss).collect();
+        numbers.add(&entry.name, "keyframe_miss", mean(&missed), "cm");
+        said.push(format!(
+            "{} {lrp:.1} and {:.1} cm",
+            entry.name,
+            mean(&missed)
+        ));
+    }
+    numbers.add("all windows", "windows", stage.windows().len() as f64, "");
+    let caption = format!(
+        "Figure 12. One transition as recorded and as generated, every {EVERY} frames; LRP, and mean joint distance from the keyframe at its frame, {}: {}.",
+        stage.measured_on(),
+        said.join(", ")
+    );
+    let drawing = MotionFigure {
+        title: format!("Figure 12: {}", stage.shown().describe()),
+        caption,
+        rows,
+        shown: Shown::Every(EVERY),
+        placing: Placing::OnFirstPath,
+    };
+    Figure::of_dancers("figure_12", drawing, numbers)
+}
+
+/// Mean distance of the last predicted frame's joints from the keyframe's, cm.
+fn keyframe_miss(generated: &Generated) -> f64 {
+    let (predicted, given) = (
+        positions(generated.frames.view()),
+        &generated.request.keyframes,
+    );
+    let wanted = world_positions(given[given.len() - 1].keyframe.features.view());
+    let last = predicted[predicted.len() - 1];
+    let distances: Vec<f64> = last
+        .iter()
+        .zip(wanted)
+        .map(|(a, b)| a.distance(b))
+        .collect();
+    mean(&distances)
+}

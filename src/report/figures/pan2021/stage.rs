@@ -1,0 +1,209 @@
+//! Which windows the figures show and measure, and what a model makes of them.
+
+use glam::DVec3;
+use ndarray::{Array2, ArrayView2, s};
+use rayon::prelude::*;
+
+use crate::data::DanceClip;
+use crate::models::transition::window_features;
+use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
+use crate::motion::JOINTS;
+use crate::motion::features::{FRAME, ROOT_POSITION};
+use crate::motion::placement::{vector, world_positions};
+use crate::report::figures::FiguresError;
+use crate::synthesis::{SequenceRequest, SynthesisError};
+
+/// Windows that a model predicts in one call.
+const CHUNK: usize = 8;
+
+/// Transitions of test clips, one a clip: the first is shown, all are measured.
+pub struct Stage<'d> {
+    /// At least one.
+    windows: Vec<Window<'d>>,
+}
+
+/// One transition of a clip.
+pub struct Window<'d> {
+    pub clip: &'d DanceClip,
+    pub start: usize,
+    /// `[N + 1, 154]`, not standardised.
+    pub recorded: Array2<f64>,
+    pub request: SequenceRequest,
+}
+
+/// Which window is shown.
+pub struct Choice<'a> {
+    pub length: usize,
+    pub clip: Option<&'a str>,
+    pub start: Option<usize>,
+}
+
+/// What a model made of a window under some controls.
+pub struct Generated {
+    /// What it was asked for.
+    pub request: SequenceRequest,
+    /// Keyframe k1 and the N frames as predicted, `[N + 1, 149]`.
+    pub frames: Array2<f64>,
+}
+
+impl<'d> Stage<'d> {
+    /// The window in the middle of every clip that is long enough, in the order of the names, the chosen one before them.
+    ///
+    /// # Errors
+    /// No clip is long enough; the chosen one is not there or has no such window.
+    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, FiguresError> {
+        let needed = choice.length + 1;
+        let mut fitting: Vec<&DanceClip> = clips
+            .iter()
+            .filter(|clip| clip.frames() >= needed)
+            .collect();
+        fitting.sort_by(|a, b| a.name.cmp(&b.name));
+        let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
+        let first = match choice.clip {
+            None => 0,
+            Some(name) => fitting
+                .iter()
+                .position(|clip| clip.name == name)
+                .ok_or_else(|| FiguresError::NoClip {
+                    name: name.into(),
+                    needed,
+                    clips: fitting.iter().map(|clip| clip.name.clone()).collect(),
+                })?,
+        };
+        if fitting.is_empty() {
+            return Err(FiguresError::TooShort {
+                length: choice.length,
+                needed,
+                longest,
+            });
+        }
+        fitting[..=first].rotate_right(1);
+        let mut windows = Vec::with_capacity(fitting.len());
+        for (index, clip) in fitting.into_iter().enumerate() {
+            let last = clip.frames() - needed;
+            let start = match choice.start {
+                Some(start) if index == 0 => start,
+                _ => last / 2,
+            };
+            if start > last {
+                return Err(FiguresError::Start {
+                    start,
+                    clip: clip.name.clone(),
+                    frames: clip.frames(),
+                    needed,
+                    last,
+                });
+            }
+            windows.push(Window {
+                clip,
+                start,
+                recorded: window_features(&clip.features, start, choice.length),
+                request: SequenceRequest::from_clip(clip, &[start, start + choice.length])?,
+            });
+        }
+        Ok(Self { windows })
+    }
+
+    /// The window that the figures show.
+    pub fn shown(&self) -> &Window<'d> {
+        &self.windows[0]
+    }
+
+    /// All windows, the shown one first.
+    pub fn windows(&self) -> &[Window<'d>] {
+        &self.windows
+    }
+
+    /// What the means in captions are over.
+    pub fn measured_on(&self) -> String {
+        match self.windows.len() {
+            1 => "on this transition".into(),
+            count => format!("in the mean of {count} test transitions"),
+        }
+    }
+
+    /// A figure's title: what it is about, by which model, on which window.
+    pub fn title(&self, what: &str, model: &str) -> String {
+        format!("{what}: {model} on {}", self.shown().describe())
+    }
+
+    /// What the model makes of every window under the controls that `change` sets, as it predicts it: nothing is blended or cleaned up.
+    ///
+    /// # Errors
+    /// A control does not fit, or the model fails.
+    pub fn generate(
+        &self,
+        model: &dyn TransitionModel,
+        change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
+    ) -> Result<Vec<Generated>, FiguresError> {
+        let requests: Vec<SequenceRequest> = self
+            .windows
+            .iter()
+            .map(|window| change(window.request.clone()))
+            .collect::<Result<_, _>>()?;
+        let transitions: Vec<TransitionRequest> = requests
+            .iter()
+            .map(|request| request.transition(1, request.keyframes[0].keyframe.clone()))
+            .collect();
+        let predicted: Vec<Vec<Transition>> = transitions
+            .par_chunks(CHUNK)
+            .map(|chunk| model.transitions(chunk))
+            .collect::<Result<_, _>>()?;
+        let predicted = predicted.into_iter().flatten();
+        let generated = requests
+            .into_iter()
+            .zip(predicted)
+            .map(|(request, predicted)| {
+                predicted.check(request.frames() - 1)?;
+                let mut frames = Array2::zeros((request.frames(), FRAME));
+                let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
+                frames.row_mut(0).assign(&first);
+                frames.slice_mut(s![1.., ..]).assign(&predicted.frames);
+                Ok(Generated { request, frames })
+            });
+        generated.collect()
+    }
+}
+
+impl Window<'_> {
+    /// "NAME, frames 120 to 220 (N = 100)".
+    pub fn describe(&self) -> String {
+        let length = self.recorded.nrows() - 1;
+        format!(
+            "{}, frames {} to {} (N = {length})",
+            self.clip.name,
+            self.start,
+            self.start + length
+        )
+    }
+}
+
+impl Generated {
+    /// World positions of the joints with the last frame as the keyframe that was given, `[N + 1][24]`, cm.
+    pub fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
+        let mut drawn = positions(self.frames.view());
+        if let (Some(last), Some(target)) = (drawn.last_mut(), self.request.keyframes.last()) {
+            *last = world_positions(target.keyframe.features.view());
+        }
+        drawn
+    }
+
+    /// Root positions that were asked for, cm.
+    pub fn target(&self) -> Vec<DVec3> {
+        points(self.request.root_trajectory.view())
+    }
+
+    /// Root positions as predicted, cm.
+    pub fn roots(&self) -> Vec<DVec3> {
+        points(self.frames.slice(s![.., ROOT_POSITION]))
+    }
+}
+
+/// World positions of the joints of every frame, cm.
+pub fn positions(frames: ArrayView2<f64>) -> Vec<[DVec3; JOINTS]> {
+    frames.rows().into_iter().map(world_positions).collect()
+}
+
+fn points(rows: ArrayView2<f64>) -> Vec<DVec3> {
+    rows.rows().into_iter().map(vector).collect()
+}

@@ -1,0 +1,231 @@
+//! Figures 4 (b), 8 and 9: velocity factors, measured and as a control.
+
+use super::root::mean_body_distance;
+use super::stage::{Generated, Stage};
+use super::wording::{Verdict, mean, percent};
+use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
+use crate::models::transition::TransitionModel;
+use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
+use crate::report::chart::{Axis, Chart, Line};
+use crate::report::figures::{Figure, FiguresError, Numbers};
+use crate::report::{MotionFigure, MotionRow, Shown};
+use crate::synthesis::{SequenceRequest, SynthesisOptions, synthesise};
+use ndarray::s;
+
+/// Frames from one drawn dancer to the next, as in the paper.
+const EVERY: usize = 5;
+/// What the velocity factors are multiplied by in figure 8.
+const GAINS: [f64; 2] = [0.5, 1.5];
+/// The same in figure 9, for left leg and right arm.
+const PART_GAINS: [f64; PARTS] = [1.0, 1.5, 1.0, 1.5, 1.0];
+
+/// Figure 4 (b): velocity factors along a generated motion, one that passes through its keyframes.
+pub fn figure_4b(stage: &Stage, model: &dyn TransitionModel) -> Result<Figure, FiguresError> {
+    let request = &stage.shown().request;
+    let sequence = synthesise(model, request, &SynthesisOptions::default(), model.name())?;
+    let factors = measured_velocity_factors(sequence.features.view());
+    let measured = mean_velocity_factors(sequence.features.view());
+    let wanted = asked(request);
+    let mut numbers = Numbers::default();
+    numbers.add_factor_series(model.name(), &factors);
+    numbers.add_parts(model.name(), "velocity_factor_mean", measured, "cm/frame");
+    numbers.add_parts(
+        model.name(),
+        "velocity_factor_mean_asked",
+        wanted,
+        "cm/frame",
+    );
+    let caption = format!(
+        "Figure 4 (b). Velocity factors (eq. 1) of the five body parts along the motion that {} generates for {}, through its keyframes: {:.2} cm/frame in the mean, {:.2} were \
+         asked for.",
+        model.name(),
+        stage.shown().describe(),
+        mean(&measured),
+        mean(&wanted)
+    );
+    let line = |part: usize| Line {
+        name: PART_NAMES[part].replace('_', " "),
+        points: (1..factors.len())
+            .map(|frame| (frame as f64, factors[frame][part]))
+            .collect(),
+        emphasised: false,
+        dashed: false,
+        dots: false,
+        colour: part,
+    };
+    let svg = Chart {
+        title: "Figure 4 (b): velocity factors of a generated motion".into(),
+        caption: caption.clone(),
+        x: Axis::linear("frame"),
+        y: Axis::linear("velocity factor (cm/frame)"),
+        lines: (0..PARTS).map(line).collect(),
+    }
+    .svg()?;
+    Ok(Figure {
+        name: "figure_4b",
+        caption,
+        svg,
+        numbers,
+    })
+}
+
+/// Figure 8: all velocity factors times 1.0, 0.5 and 1.5.
+pub fn figure_8(
+    stage: &Stage,
+    model: &dyn TransitionModel,
+    plain: &[Generated],
+) -> Result<Figure, FiguresError> {
+    let mut numbers = Numbers::default();
+    let mut rows = vec![row("factors × 1.0", &plain[0])];
+    record_means(&mut numbers, "x 1.0", plain);
+    let mut results = Vec::new();
+    let mut answers = Vec::new();
+    for gain in GAINS {
+        let generated = stage.generate(model, |request| request.velocity_times([gain; PARTS]))?;
+        rows.push(row(&format!("factors × {gain:.1}"), &generated[0]));
+        let label = format!("x {gain:.1}");
+        record_means(&mut numbers, &label, &generated);
+        let answer = responses(&generated, plain);
+        record_responses(&mut numbers, &label, answer);
+        let distance = mean_body_distance(&generated, plain);
+        numbers.add(&label, "body_distance_from_x_1.0", distance, "cm");
+        answers.push((gain, answer, distance));
+        results.push(generated);
+    }
+    let between = mean_body_distance(&results[0], &results[1]);
+    numbers.add("x 0.5 / x 1.5", "body_distance", between, "cm");
+    numbers.add("all windows", "windows", plain.len() as f64, "");
+    let said: Vec<String> = answers
+        .iter()
+        .map(|(gain, answer, distance)| {
+            let shares = answer.map(Response::share);
+            format!(
+                "×\u{a0}{gain:.1} gives {} of the change of speed (bodies {distance:.1} cm a joint apart)",
+                percent(mean(&shares))
+            )
+        })
+        .collect();
+    let all: Vec<Response> = answers.iter().flat_map(|(_, answer, _)| *answer).collect();
+    let caption = format!(
+        "Figure 8. One transition with all velocity factors times 1.0, 0.5 and 1.5, every {EVERY} frames: {}, {}; {}.",
+        stage.measured_on(),
+        said.join(", "),
+        Verdict::of(model.name(), "the velocity factors", &all)
+    );
+    let title = stage.title("Figure 8", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
+    Figure::of_dancers("figure_8", drawing, numbers)
+}
+
+/// Figure 9: the velocity factors of right arm and left leg times 1.5.
+pub fn figure_9(
+    stage: &Stage,
+    model: &dyn TransitionModel,
+    plain: &[Generated],
+) -> Result<Figure, FiguresError> {
+    let faster = stage.generate(model, |request| request.velocity_times(PART_GAINS))?;
+    let marked = PART_GAINS.map(|gain| gain != 1.0);
+    let rows = vec![
+        row("(a) as asked in the clip", &plain[0]),
+        MotionRow {
+            marked,
+            ..row("(b) right arm, left leg × 1.5", &faster[0])
+        },
+    ];
+    let mut numbers = Numbers::default();
+    record_means(&mut numbers, "(a)", plain);
+    record_means(&mut numbers, "(b)", &faster);
+    let answers = responses(&faster, plain);
+    let gained = changes(&faster, plain);
+    numbers.add_parts("(b)", "velocity_factor_change", gained, "cm/frame");
+    let chosen: Vec<usize> = (0..PARTS).filter(|&part| marked[part]).collect();
+    let of_chosen: Vec<Response> = chosen.iter().map(|&part| answers[part]).collect();
+    for &part in &chosen {
+        let share = answers[part].share();
+        numbers.add_part("(b)", "velocity_factor_change_share", part, share, "");
+    }
+    let distance = mean_body_distance(&faster, plain);
+    numbers.add("(b) / (a)", "body_distance", distance, "cm");
+    numbers.add("all windows", "windows", plain.len() as f64, "");
+    let said: Vec<String> = chosen
+        .iter()
+        .map(|&part| {
+            let name = PART_NAMES[part].replace('_', " ");
+            format!("the {name} gives {}", percent(answers[part].share()))
+        })
+        .collect();
+    let others: Vec<f64> = (0..PARTS)
+        .filter(|part| !marked[*part])
+        .map(|part| gained[part].abs())
+        .collect();
+    let caption = format!(
+        "Figure 9. One transition, (b) with the velocity factors of right arm and left leg (blue) times 1.5, every {EVERY} frames: {}, of the change asked for {}, \
+         the other parts change by {:.2} cm/frame, bodies are {distance:.1} cm a joint apart; {}.",
+        stage.measured_on(),
+        said.join(" and "),
+        mean(&others),
+        Verdict::of(
+            model.name(),
+            "the velocity factors of single parts",
+            &of_chosen
+        )
+    );
+    let title = stage.title("Figure 9", model.name());
+    let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
+    Figure::of_dancers("figure_9", drawing, numbers)
+}
+
+fn row(label: &str, generated: &Generated) -> MotionRow {
+    MotionRow::between_keyframes(label, generated.drawn(), true)
+}
+
+/// Mean velocity factors that were asked for in the predicted frames, cm/frame.
+fn asked(request: &SequenceRequest) -> [f64; PARTS] {
+    asked_after(request, 0)
+}
+
+/// The same in the frames after frame `from`.
+pub fn asked_after(request: &SequenceRequest, from: usize) -> [f64; PARTS] {
+    let factors = request.velocity_factors.slice(s![from + 1.., ..]);
+    std::array::from_fn(|part| mean(&factors.column(part).to_vec()))
+}
+
+/// Mean over the windows of one number a part.
+pub fn mean_parts(
+    generated: &[Generated],
+    of: impl Fn(&Generated) -> [f64; PARTS],
+) -> [f64; PARTS] {
+    mean_rows(&generated.iter().map(of).collect::<Vec<_>>())
+}
+
+fn measured(generated: &Generated) -> [f64; PARTS] {
+    mean_velocity_factors(generated.frames.view())
+}
+
+/// Change of the measured mean velocity factors, cm/frame.
+fn changes(changed: &[Generated], plain: &[Generated]) -> [f64; PARTS] {
+    let [after, before] = [changed, plain].map(|of| mean_parts(of, measured));
+    std::array::from_fn(|part| after[part] - before[part])
+}
+
+/// Changes of mean velocity factors, asked for and measured, in the mean over the windows.
+fn responses(changed: &[Generated], plain: &[Generated]) -> [Response; PARTS] {
+    std::array::from_fn(|part| {
+        Response::mean(changed.iter().zip(plain).map(|(changed, plain)| Response {
+            asked: asked(&changed.request)[part] - asked(&plain.request)[part],
+            measured: measured(changed)[part] - measured(plain)[part],
+        }))
+    })
+}
+
+fn record_means(numbers: &mut Numbers, label: &str, generated: &[Generated]) {
+    let asked = mean_parts(generated, |generated| asked(&generated.request));
+    numbers.add_parts(label, "velocity_factor_mean_asked", asked, "cm/frame");
+    let measured = mean_parts(generated, measured);
+    numbers.add_parts(label, "velocity_factor_mean", measured, "cm/frame");
+}
+
+fn record_responses(numbers: &mut Numbers, label: &str, answers: [Response; PARTS]) {
+    let shares = answers.map(Response::share);
+    numbers.add_parts(label, "velocity_factor_change_share", shares, "");
+}

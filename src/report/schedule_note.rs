@@ -1,0 +1,55 @@
+//! The budget of a training in words, for the caption of its scores.
+
+use super::thousands;
+use crate::experiment::ExperimentConfig;
+use crate::optim::{AdamConfig, RateShape};
+use crate::run::{Manifest, RunState};
+
+/// The note of a model that has no weights.
+pub const NO_TRAINING: &str = "needs no training";
+
+/// The budget of a training, for a caption; all but the seed.
+pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
+    let done = manifest.frame_steps_done;
+    let mut note = format!("{} frame-steps", thousands(done));
+    if let Some(whole) = manifest.whole_schedule_frame_steps {
+        note += &format!(
+            " ({:.3} % of the whole schedule's {})",
+            100.0 * done as f64 / whole as f64,
+            thousands(whole)
+        );
+    }
+    note += &format!(
+        ", schedule.fraction {}, batch size {}, {}",
+        config.schedule.fraction,
+        config.schedule.batch_size,
+        learning_rate(&config.optimiser)
+    );
+    if manifest.state != RunState::Finished {
+        note += &format!(
+            "; not finished: {} of {} steps",
+            manifest.steps_done, manifest.steps
+        );
+    }
+    note
+}
+
+fn learning_rate(optimiser: &AdamConfig) -> String {
+    let rate = optimiser.learning_rate;
+    let mut text = format!("learning rate {rate}");
+    if let Some(rate) = optimiser.transformer_learning_rate {
+        text += &format!(" ({rate} for Transformers)");
+    }
+    let Some(schedule) = optimiser.rate_schedule else {
+        return text;
+    };
+    if schedule.warmup_steps > 0 {
+        text += &format!(" after {} steps of warm-up", schedule.warmup_steps);
+    }
+    let shape = match schedule.shape {
+        RateShape::Constant => return text,
+        RateShape::Linear => "linearly",
+        RateShape::Cosine => "as a cosine",
+    };
+    text + &format!(", falling {shape} to {}", rate * schedule.final_share)
+}

@@ -1,0 +1,342 @@
+//! Keyframes from files: which frames of which, and when.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use ndarray::{Array2, ArrayView2, s};
+
+use super::{KeyframeSource, SequenceRequest, SynthesisError};
+use crate::data::{DanceClip, DataConfig, DataError};
+use crate::motion::bvh::{self, BvhError, Channel};
+use crate::motion::features::VELOCITY_FACTORS;
+use crate::motion::{Mapping, MappingError};
+
+/// Frames of a result at most: an hour at 30 a second.
+pub const LONGEST: u32 = 108_000;
+
+/// A frame of a file as a keyframe: "FILE.bvh:FRAME@TIME".
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileKeyframe {
+    pub file: PathBuf,
+    /// Frame of the file at the data's rate.
+    pub frame: usize,
+    /// Frame of the result.
+    pub time: usize,
+}
+
+impl FromStr for FileKeyframe {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = || {
+            let (rest, time) = text.rsplit_once('@')?;
+            let (file, frame) = rest.rsplit_once(':')?;
+            let (frame, time) = (frame.parse().ok()?, time.parse().ok()?);
+            let file = Some(PathBuf::from(file)).filter(|file| !file.as_os_str().is_empty())?;
+            Some(Self { file, frame, time })
+        };
+        let keyframe =
+            parts().ok_or("expected FILE.bvh:FRAME@TIME with whole numbers from 0 on")?;
+        if keyframe.time > LONGEST as usize {
+            return Err(format!("TIME {} is beyond {LONGEST} frames", keyframe.time));
+        }
+        Ok(keyframe)
+    }
+}
+
+/// Which keyframes a result has.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct KeyframeChoice {
+    /// A dancer's file, which gives the controls between its keyframes, too, and its frames that are keyframes, ascending: the first
+    /// becomes frame 0 of the result, the others keep their distances.
+    pub motion: Option<(PathBuf, Vec<usize>)>,
+    /// Keyframes beside those.
+    pub further: Vec<FileKeyframe>,
+    /// For clips on another skeleton than the dance skeleton, in place of the data's.
+    pub mapping: Option<PathBuf>,
+}
+
+/// Why files give no keyframes.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyframeError {
+    #[error("--keyframes: frame {frame} follows frame {before}; give ascending frames, each once")]
+    Order { before: usize, frame: usize },
+    #[error(
+        "no keyframes; give --motion FILE.bvh --keyframes 120,180,260, or --keyframe FILE.bvh:FRAME@TIME twice or more"
+    )]
+    None,
+    #[error("one keyframe only; a dance goes from one keyframe to another, give two or more")]
+    One,
+    #[error(
+        "the first keyframe stands at frame {time} of the result; give one at frame 0 (FILE.bvh:FRAME@0)"
+    )]
+    First { time: usize },
+    #[error("two keyframes stand at frame {time} of the result, {} and {}; keep one", files[0], files[1])]
+    SameTime { time: usize, files: [String; 2] },
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    #[error(transparent)]
+    Bvh(#[from] BvhError),
+    #[error("{file} cannot be used")]
+    Clip { file: PathBuf, source: DataError },
+    #[error(
+        "the result ends at frame {end}, but {file} ends {last} frames after its first keyframe; give earlier keyframes, or --keyframe only"
+    )]
+    MotionEnds {
+        file: PathBuf,
+        end: usize,
+        last: usize,
+    },
+    #[error(
+        "--length puts the last keyframe at frame {end} of the result, beyond {LONGEST} frames; give smaller lengths"
+    )]
+    TooLong { end: usize },
+    #[error(
+        "--length gives {lengths} numbers for the {} transitions between {keyframes} keyframes; give one number, or one for each",
+        keyframes - 1
+    )]
+    Lengths { lengths: usize, keyframes: usize },
+    #[error(
+        "{file} has {found} frames, the result needs velocity factors of {needed} from its frame {first} on; give a longer clip or an \
+         earlier frame"
+    )]
+    VelocityEnds {
+        file: PathBuf,
+        found: usize,
+        needed: usize,
+        first: usize,
+    },
+    #[error(transparent)]
+    Synthesis(#[from] SynthesisError),
+}
+
+/// A file that was read.
+struct Source {
+    clip: DanceClip,
+    /// The file's channels, where it is on the dance skeleton and every joint turns.
+    channels: Option<Vec<Vec<Channel>>>,
+}
+
+/// The keyframes of a result with the files that they come from.
+pub struct Keyframes {
+    sources: BTreeMap<PathBuf, Source>,
+    /// File, frame and time of every keyframe, by time.
+    keyframes: Vec<FileKeyframe>,
+    /// The dancer's file and its first keyframe.
+    motion: Option<(PathBuf, usize)>,
+    mapping: Option<Mapping>,
+    data: DataConfig,
+}
+
+impl Keyframes {
+    /// Reads the files of a choice.
+    ///
+    /// # Errors
+    /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton.
+    pub fn read(choice: &KeyframeChoice, data: &DataConfig) -> Result<Self, KeyframeError> {
+        let mut keyframes = choice.further.clone();
+        let mut motion = None;
+        if let Some((file, frames)) = &choice.motion {
+            if let Some(pair) = frames.windows(2).find(|pair| pair[1] <= pair[0]) {
+                let (before, frame) = (pair[0], pair[1]);
+                return Err(KeyframeError::Order { before, frame });
+            }
+            let first = frames.first().copied().unwrap_or(0);
+            motion = Some((file.clone(), first));
+            keyframes.extend(frames.iter().map(|&frame| FileKeyframe {
+                file: file.clone(),
+                frame,
+                time: frame - first,
+            }));
+        }
+        keyframes.sort_by_key(|keyframe| keyframe.time);
+        match &keyframes[..] {
+            [] => return Err(KeyframeError::None),
+            [_] => return Err(KeyframeError::One),
+            [first, ..] if first.time > 0 => {
+                return Err(KeyframeError::First { time: first.time });
+            }
+            _ => {}
+        }
+        if let Some(pair) = keyframes
+            .windows(2)
+            .find(|pair| pair[0].time == pair[1].time)
+        {
+            return Err(KeyframeError::SameTime {
+                time: pair[0].time,
+                files: [&pair[0], &pair[1]]
+                    .map(|keyframe| format!("{}:{}", keyframe.file.display(), keyframe.frame)),
+            });
+        }
+        let path = choice.mapping.as_deref().or(data.mapping.as_deref());
+        let mut read = Self {
+            sources: BTreeMap::new(),
+            keyframes,
+            motion,
+            mapping: path.map(Mapping::read).transpose()?,
+            data: data.clone(),
+        };
+        for keyframe in read.keyframes.clone() {
+            if !read.sources.contains_key(&keyframe.file) {
+                let source = read.source(&keyframe.file)?;
+                read.sources.insert(keyframe.file.clone(), source);
+            }
+        }
+        Ok(read)
+    }
+
+    fn source(&self, path: &Path) -> Result<Source, KeyframeError> {
+        let document = bvh::read(path)?;
+        let clip = document.to_clip();
+        let own = clip.skeleton.is_dance_skeleton();
+        let turns = |channels: &Vec<Channel>| {
+            let rotations = channels
+                .iter()
+                .filter(|c| matches!(c, Channel::Rotation(_)));
+            rotations.count() == 3
+        };
+        let channels = document.channels();
+        let channels = (own && channels.iter().all(turns)).then(|| channels.to_vec());
+        let mapping = self.mapping.as_ref().filter(|_| !own);
+        let clip =
+            DanceClip::new(clip, mapping, &self.data).map_err(|source| KeyframeError::Clip {
+                file: path.into(),
+                source,
+            })?;
+        Ok(Source { clip, channels })
+    }
+
+    /// Velocity factors of a further file, read on the same terms, in `frames` frames from its frame `first` on, `[frames, 5]`, cm/frame.
+    ///
+    /// # Errors
+    /// It cannot be read, is on another skeleton or ends too early.
+    pub fn velocity_factors(
+        &self,
+        path: &Path,
+        first: usize,
+        frames: usize,
+    ) -> Result<Array2<f64>, KeyframeError> {
+        let read;
+        let clip = match self.sources.get(path) {
+            Some(source) => &source.clip,
+            None => {
+                read = self.source(path)?;
+                &read.clip
+            }
+        };
+        if clip.frames().saturating_sub(first) < frames {
+            return Err(KeyframeError::VelocityEnds {
+                file: path.into(),
+                found: clip.frames(),
+                needed: frames,
+                first,
+            });
+        }
+        let rows = s![first..first + frames, VELOCITY_FACTORS];
+        Ok(clip.features.slice(rows).to_owned())
+    }
+
+    /// The dancer's clip.
+    pub fn motion(&self) -> Option<&DanceClip> {
+        let (path, _) = self.motion.as_ref()?;
+        Some(&self.sources[path].clip)
+    }
+
+    /// What the dancer does in the frames of a request, `[F, 154]`; none where the request has other keyframes than its, or has them at other
+    /// distances.
+    pub fn recorded(&self, request: &SequenceRequest) -> Option<ArrayView2<'_, f64>> {
+        let (path, first) = self.motion.as_ref()?;
+        let its_own = |keyframe: &FileKeyframe| {
+            keyframe.file == *path && keyframe.frame == first + keyframe.time
+        };
+        let times = self.keyframes.iter().map(|keyframe| keyframe.time);
+        let frames = *first..*first + request.frames();
+        let clip = &self.sources[path].clip;
+        let runs_along = self.keyframes.iter().all(its_own)
+            && times.eq(request.times())
+            && frames.end <= clip.frames();
+        runs_along.then(|| clip.features.slice(s![frames, ..]))
+    }
+
+    /// The channels of the first keyframe's file, where they can hold the result.
+    pub fn channels(&self) -> Option<&[Vec<Channel>]> {
+        let first = self.keyframes.first()?;
+        self.sources[&first.file].channels.as_deref()
+    }
+
+    /// The request: trajectory and velocity factors of the dancer's clip where there is one. `lengths`: frames from each of its keyframes
+    /// to the next, none for their own distances, one for all, or one for each.
+    ///
+    /// # Errors
+    /// Frames that a file does not have; dancers that do not fit each other; keyframes beyond the end of the dancer's clip; lengths that
+    /// do not fit the keyframes.
+    pub fn request(&self, lengths: &[u32]) -> Result<SequenceRequest, KeyframeError> {
+        let sources: Vec<KeyframeSource> = self
+            .keyframes
+            .iter()
+            .map(|keyframe| KeyframeSource {
+                clip: &self.sources[&keyframe.file].clip,
+                frame: keyframe.frame,
+                time: keyframe.time,
+            })
+            .collect();
+        let request = SequenceRequest::from_keyframes(&sources)?;
+        let Some(((path, first), clip)) = self.motion.as_ref().zip(self.motion()) else {
+            return Ok(request);
+        };
+        let last = clip.frames() - 1 - first;
+        if request.frames() - 1 > last {
+            return Err(KeyframeError::MotionEnds {
+                file: path.clone(),
+                end: request.frames() - 1,
+                last,
+            });
+        }
+        let request = request.like(clip, *first)?;
+        let lengths = match *lengths {
+            [] => return Ok(request),
+            [length] => vec![length as usize; self.keyframes.len() - 1],
+            _ => lengths.iter().map(|&length| length as usize).collect(),
+        };
+        let mut times = vec![0];
+        for length in lengths {
+            times.push(times[times.len() - 1] + length);
+        }
+        let end = times[times.len() - 1];
+        if end > LONGEST as usize {
+            return Err(KeyframeError::TooLong { end });
+        }
+        request.at_times(&times).map_err(|error| match error {
+            SynthesisError::Times { keyframes, times } => KeyframeError::Lengths {
+                lengths: times - 1,
+                keyframes,
+            },
+            other => other.into(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_keyframe_is_taken_apart_from_its_end() {
+        let keyframe = FileKeyframe::from_str("a:b@c.bvh:75@60").unwrap();
+        assert_eq!(keyframe.file, PathBuf::from("a:b@c.bvh"));
+        assert_eq!((keyframe.frame, keyframe.time), (75, 60));
+        for bad in [
+            "a.bvh",
+            "a.bvh:1",
+            "a.bvh@3",
+            "a.bvh:-1@3",
+            "a.bvh:1@x",
+            ":1@2",
+            "a.bvh:1@999999999",
+            "a.bvh:1@18446744073709551615",
+        ] {
+            assert!(FileKeyframe::from_str(bad).is_err(), "{bad}");
+        }
+    }
+}

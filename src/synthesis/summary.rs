@@ -1,0 +1,109 @@
+//! What there is to say of a sequence: as text and as JSON.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error};
+
+/// The numbers of a generated sequence. Distances in cm, frames of the result.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    model: String,
+    frames: usize,
+    fps: f64,
+    keyframes: Vec<KeyframeSummary>,
+    /// From the root trajectory asked for to the root of the result.
+    trajectory_error: Distances,
+    /// From predicted positions to those of the fitted rotations.
+    rotation_fit_error: Distances,
+    /// cm/frame of a foot joint in predicted contact; none where no contact is predicted.
+    foot_skate: Option<f64>,
+    /// The same after the feet were pinned; none where they were not.
+    foot_skate_cleaned: Option<f64>,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct KeyframeSummary {
+    frame: usize,
+    /// From the joints of the model's own last frame to the keyframe's, before it was bent onto it; none for the first keyframe.
+    missed: Option<Distances>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Distances {
+    mean: f64,
+    max: f64,
+}
+
+impl Summary {
+    /// `model`: what to call the model.
+    pub fn new(
+        model: &str,
+        request: &SequenceRequest,
+        sequence: &Sequence,
+        options: &SynthesisOptions,
+        warnings: &[ControlWarning],
+    ) -> Self {
+        let missed = |frame: usize| {
+            let miss = sequence.misses.iter().find(|miss| miss.time == frame)?;
+            let (mean, max) = (miss.mean, miss.max);
+            Some(Distances { mean, max })
+        };
+        let keyframes = sequence.keyframes.iter().map(|&frame| KeyframeSummary {
+            frame,
+            missed: missed(frame),
+        });
+        let (mean, max) = trajectory_error(request, sequence);
+        Self {
+            model: model.into(),
+            frames: sequence.clip.poses.len(),
+            fps: 1.0 / sequence.clip.frame_time,
+            keyframes: keyframes.collect(),
+            trajectory_error: Distances { mean, max },
+            rotation_fit_error: Distances {
+                mean: sequence.fit.mean,
+                max: sequence.fit.max,
+            },
+            foot_skate: sequence.foot_skate.before,
+            foot_skate_cleaned: sequence.foot_skate.after.filter(|_| options.foot_cleanup),
+            warnings: warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.model)?;
+        writeln!(f, "{} frames at {:.4} a second", self.frames, self.fps)?;
+        for keyframe in &self.keyframes {
+            write!(f, "keyframe at frame {}", keyframe.frame)?;
+            match keyframe.missed {
+                Some(Distances { mean, max }) => writeln!(
+                    f,
+                    ": the model missed it by {mean:.1} cm in the mean, {max:.1} cm at most, and was bent onto it"
+                )?,
+                None => writeln!(f)?,
+            }
+        }
+        let Distances { mean, max } = self.trajectory_error;
+        writeln!(
+            f,
+            "the root is {mean:.1} cm from the trajectory asked for in the mean, {max:.1} cm at most"
+        )?;
+        let Distances { mean, max } = self.rotation_fit_error;
+        writeln!(
+            f,
+            "rotations meet the predicted positions to {mean:.1} cm in the mean, {max:.1} cm at most"
+        )?;
+        match (self.foot_skate, self.foot_skate_cleaned) {
+            (None, _) => writeln!(f, "the model predicts no foot on the ground"),
+            (Some(skate), None) => writeln!(f, "feet on the ground slide {skate:.2} cm/frame"),
+            (Some(skate), Some(cleaned)) => writeln!(
+                f,
+                "feet on the ground slid {skate:.2} cm/frame, {cleaned:.2} after they were pinned"
+            ),
+        }
+    }
+}
