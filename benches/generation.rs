@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use keydance::models::ModelConfig;
+use keydance::models::transition::ModelConfig;
 use keydance::models::transition::measure::MeasuredGeneration;
 
 const FRAMES: usize = 60;

@@ -27,7 +27,6 @@ pub mod models;
 pub mod motion;
 pub mod nn;
 pub mod optim;
-#[cfg(feature = "papers")]
 pub mod report;
 pub mod run;
 #[cfg(feature = "papers")]

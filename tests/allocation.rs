@@ -87,7 +87,7 @@ fn steps(config: &Pan2021Config, feed: Feed, windows: &[usize]) -> Vec<Step> {
         .collect();
     let mut workspace = Workspace::new();
     let mut gradients = [Gradients::zeros(&parameters)];
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| false);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
     let steps = batches.iter().enumerate().map(|(step, batch)| {
         let before = LARGE_BYTES.load(Ordering::Relaxed);
         let mut tape = Tape::recording(&parameters, &mut workspace).with_dropout(step as u64);

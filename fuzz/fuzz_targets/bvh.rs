@@ -1,7 +1,8 @@
 //! The BVH reader, and what every clip that it lets through must survive.
 #![no_main]
 
-use keydance::data::{DanceClip, DataConfig};
+use keydance::models::transition::DanceClip;
+use keydance::data::DataConfig;
 use keydance::motion::bvh;
 use libfuzzer_sys::fuzz_target;
 

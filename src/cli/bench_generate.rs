@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use clap::Args;
 
-use crate::models::ModelConfig;
+use crate::models::transition::ModelConfig;
 use crate::models::transition::measure::MeasuredGeneration;
 
 /// Frames of the generated transitions.

@@ -1,6 +1,7 @@
 //! `keydance bench-step`: how fast a training step is on this machine.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -10,6 +11,11 @@ use crate::training::measure::step_speed;
 /// What is timed.
 #[derive(Debug, Args)]
 pub struct BenchStepArgs {
+    /// Config of an experiment; without one, the first paper's whole model
+    config: Option<PathBuf>,
+    /// Override a key of the config; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// Frames of a transition
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
     frames: u16,
@@ -34,10 +40,15 @@ pub struct BenchStepArgs {
 /// # Errors
 /// No threads to be had.
 pub fn run(args: BenchStepArgs) -> anyhow::Result<()> {
-    let mut config = ExperimentConfig::default();
-    if let Some(shards) = args.shards {
-        config.schedule.shards = shards.into();
-    }
+    let mut sets = args.set;
+    sets.extend(
+        args.shards
+            .map(|shards| format!("schedule.shards={shards}")),
+    );
+    let config = match &args.config {
+        Some(path) => ExperimentConfig::load(path, &sets)?,
+        None => ExperimentConfig::with_sets(&sets)?,
+    };
     let speed = step_speed(
         &config,
         args.frames.into(),

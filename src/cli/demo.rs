@@ -13,12 +13,13 @@ use super::notice::notice;
 use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::data::{DanceClip, Dataset};
-use crate::evaluation::{Evaluation, Protocol, terminal_tables};
-use crate::experiment::{DemoSettings, ExperimentConfig};
+use crate::data::{DataPart, Dataset, Recording};
+use crate::evaluation::{Scores, Tables};
+use crate::experiment::ExperimentConfig;
+use crate::models::Generator;
 use crate::models::baselines::interpolation::Interpolation;
-use crate::models::transition::{TrainedModel, TransitionModel};
-use crate::report::demo::{self, Comparison, Losses, Showcase};
+use crate::models::transition::DanceClip;
+use crate::report::demo::{self, Comparison, DemoSettings, Losses, Showcase};
 use crate::report::thousands;
 use crate::run::RunFolder;
 use crate::training::Trainer;
@@ -56,7 +57,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     demo::remove_results(run.path())?;
 
     let dataset = settings.dataset()?;
-    let of = |clips: &[DanceClip]| clips.iter().map(DanceClip::frames).sum::<usize>() as u64;
+    let of = |clips: &[Recording]| clips.iter().map(Recording::frames).sum::<usize>() as u64;
     writeln!(
         out,
         "{} clips to train on ({} frames), {} to test on ({} frames), generated from seed {}",
@@ -74,24 +75,38 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
         contact_threshold: config.data.contact_threshold,
     };
     let pool = args.threads.pool()?;
-    let evaluate = |model: &dyn TransitionModel| -> anyhow::Result<Evaluation> {
-        let protocol = Protocol::default();
-        let outcome = pool.install(|| evaluate_watched(&protocol, model, &dataset.test))?;
-        Ok(outcome.evaluation)
+    let protocol = config.protocol();
+    let evaluate = |model: &dyn Generator| -> anyhow::Result<Scores> {
+        let evaluated =
+            pool.install(|| evaluate_watched(&*protocol, model, &dataset, DataPart::Test))?;
+        Ok(evaluated.scores)
     };
     let comparison = Comparison {
         interpolation: evaluate(&interpolation)?,
-        untrained: evaluate(&untrained)?,
-        model: evaluate(&model)?,
+        untrained: evaluate(&*untrained)?,
+        model: evaluate(&*model)?,
     };
     let manifest = run.manifest()?.context("the training left no manifest")?;
     let rows = comparison.rows(config, &manifest);
-    write!(out, "\n{}\n", terminal_tables(&rows))?;
-    demo::write_scores(run.path(), &settings, &dataset, &comparison, &rows)?;
+    let printed = config.printed()?;
+    let tables = Tables {
+        metrics: protocol.metrics(),
+        printed: &printed,
+    };
+    write!(out, "\n{}\n", tables.terminal(&rows))?;
+    demo::write_scores(
+        run.path(),
+        &settings,
+        &dataset,
+        &comparison,
+        &printed,
+        &rows,
+    )?;
 
-    let showcase = Showcase::new(&dataset.test)?;
+    let clips = DanceClip::measure_all(&dataset.test, &config.data.features())?;
+    let showcase = Showcase::new(&clips)?;
     let files = demo::showcase_files(run.path());
-    let motion = showcase.write(&interpolation, &model, &files)?;
+    let motion = showcase.write(&interpolation, &*model, &files)?;
     writeln!(
         out,
         "{}: {showcase}; its rotations meet the predicted positions to {:.1} cm in the mean, {:.1} cm at most",
@@ -122,17 +137,17 @@ fn train(
     dataset: &Dataset,
     threads: usize,
     run: &RunFolder,
-) -> anyhow::Result<(TrainedModel, Losses)> {
+) -> anyhow::Result<(Box<dyn Generator>, Losses)> {
     let mut trainer = Trainer::new(config.clone(), dataset, threads)?;
     writeln!(
         std::io::stdout(),
         "a whole model with {} weights; {} steps, {} frame-steps on {threads} threads",
         thousands(trainer.parameters().weights() as u64),
-        trainer.schedule().steps(),
-        thousands(trainer.schedule().frame_steps())
+        trainer.task().steps(),
+        thousands(trainer.task().frame_steps())
     )?;
     let untrained = trainer.model();
-    let mut progress = Progress::new(trainer.schedule(), 0);
+    let mut progress = Progress::new(trainer.task(), 0);
     let mut losses = Losses::default();
     let outcome = trainer.run(Some(run), &mut |report| {
         progress.step(report);

@@ -11,7 +11,7 @@ use super::notice::notice;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{EvaluatedData, EvaluationRecord, Protocol, TableRow, terminal_tables};
+use crate::evaluation::{EvaluatedData, EvaluationOptions, EvaluationRecord, TableRow, Tables};
 use crate::run::Subject;
 
 #[derive(Debug, Args)]
@@ -67,30 +67,35 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         "{} on {} {} clips, {} frames\n",
         subject.what, data.clips, data.part, data.frames
     )?;
-    let clips = part.of(&dataset)?;
-    let outcome = args
+    let config = &subject.config;
+    let protocol = config.model.protocol(&config.data, &args.options());
+    let evaluation = args
         .threads
         .pool()?
-        .install(|| evaluate_watched(&args.protocol(), subject.model.as_ref(), clips))?;
-    for skipped in &outcome.skipped {
-        notice(format_args!("warning: {skipped}"));
+        .install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
+    for warning in &evaluation.warnings {
+        notice(format_args!("warning: {warning}"));
     }
     let row = TableRow {
-        name: subject.config.name.clone(),
+        name: config.name.clone(),
         seed: None,
-        evaluation: Some(outcome.evaluation.clone()),
+        scores: Some(evaluation.scores.clone()),
         schedule_note: String::new(),
     };
-    write!(out, "{}", terminal_tables(&[row]))?;
+    let tables = Tables {
+        metrics: protocol.metrics(),
+        printed: &config.printed()?,
+    };
+    write!(out, "{}", tables.terminal(&[row]))?;
     let record = EvaluationRecord {
-        evaluation: outcome.evaluation,
+        scores: evaluation.scores,
         data,
     };
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
     let of_its_own = match &subject.run {
-        Some(run) => args.lengths.is_empty() && run.config()?.model == subject.config.model,
+        Some(run) => args.lengths.is_empty() && *run.config()?.model == *subject.config.model,
         None => true,
     };
     if let Some(folder) = subject.scores_folder(args.out.as_deref())?
@@ -102,15 +107,11 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
 }
 
 impl EvaluateArgs {
-    fn protocol(&self) -> Protocol {
-        let paper = Protocol::default();
-        if self.lengths.is_empty() {
-            return paper;
-        }
+    fn options(&self) -> EvaluationOptions {
         let lengths = BTreeSet::from_iter(self.lengths.iter().map(|&length| length.into()));
-        Protocol {
+        EvaluationOptions {
             lengths: lengths.into_iter().collect(),
-            ..paper
+            most_windows: None,
         }
     }
 }

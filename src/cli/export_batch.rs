@@ -3,12 +3,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow};
 use clap::Args;
 
 use crate::data::Dataset;
-use crate::models::transition::Feed;
 use crate::models::transition::exported_batch::{ExportError, ExportedBatch, export_batch};
+use crate::models::transition::{DanceClip, Feed, TransitionSettings};
 use crate::run::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
@@ -37,8 +37,11 @@ pub struct ExportBatchArgs {
 pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let run = RunFolder::open(&args.run);
     let config = run.config()?;
-    let model = run.trained_model(&config)?;
+    let settings = TransitionSettings::of(&config);
+    let settings = settings.context("only a model of transitions has batches to export")?;
+    let model = settings.load(&config.name, &run.saved_weights(&config)?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
+    let clips = DanceClip::measure_all(&dataset.train, &config.data.features())?;
     let batch = ExportedBatch {
         frames: args.frames.into(),
         windows: args.windows.into(),
@@ -47,15 +50,16 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
             false => Feed::Predictions,
         },
     };
-    let file = export_batch(&model, config.model.root_frame(), &dataset.train, &batch).map_err(
-        |error| match error {
-            ExportError::TooShort { frames } => anyhow!(
-                "no training clip of {} has the {} frames that --frames {frames} needs",
-                args.data.display(),
-                frames + 1
-            ),
-            other => other.into(),
-        },
-    )?;
+    let file =
+        export_batch(&model, settings.model.root_frame(), &clips, &batch).map_err(|error| {
+            match error {
+                ExportError::TooShort { frames } => anyhow!(
+                    "no training clip of {} has the {} frames that --frames {frames} needs",
+                    args.data.display(),
+                    frames + 1
+                ),
+                other => other.into(),
+            }
+        })?;
     Ok(replace_file(&args.out, &file)?)
 }

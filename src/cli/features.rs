@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
-use crate::data::{DanceClip, DataConfig};
+use crate::data::DataConfig;
+use crate::models::transition::DanceClip;
 use crate::motion::{Mapping, bvh};
 
 #[derive(Debug, Args)]

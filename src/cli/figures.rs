@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::threads::Threads;
 use crate::data::Dataset;
+use crate::models::transition::DanceClip;
 use crate::report::figures::index;
 use crate::report::figures::pan2021::{Cast, Choice, Stage};
 use crate::run::{Subject, replace_file};
@@ -64,8 +65,10 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     if !args.other_data {
         cast.check_data(&dataset, &args.data)?;
     }
+    let features = cast.subject().config.data.features();
+    let clips = DanceClip::measure_all(&dataset.test, &features)?;
     let stage = Stage::new(
-        &dataset.test,
+        &clips,
         &Choice {
             length: args.length.into(),
             clip: args.clip.as_deref(),

@@ -11,6 +11,7 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::notice;
+use crate::models::transition::DataRanges;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use crate::report::viewer::generated_page;
@@ -62,7 +63,11 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let request = keyframes.request(&args.keyframes.length)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
     let request = args.velocity.apply(request, &keyframes)?;
-    warnings.extend(control_warnings(&request, subject.ranges.as_ref()));
+    let ranges = match &subject.run {
+        Some(run) => DataRanges::of_run(run, &subject.config)?,
+        None => None,
+    };
+    warnings.extend(control_warnings(&request, ranges.as_ref()));
     for warning in &warnings {
         notice(format_args!("warning: {warning}"));
     }

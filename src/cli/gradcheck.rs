@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::experiment::ExperimentConfig;
-use crate::models::transition::gradient_check::GradientCheckConfig;
-use crate::models::transition::gradient_report::GradientReport;
+use crate::models::gradient_report::GradientReport;
+use crate::models::settings::GradientCheckOptions;
 
 #[derive(Debug, Args)]
 pub struct GradcheckArgs {
@@ -40,17 +40,14 @@ pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
         Some(path) => ExperimentConfig::load(path, &args.set)?,
         None => ExperimentConfig::default(),
     };
-    let model = if args.full_size {
-        experiment.model
-    } else {
-        experiment.model.small()
-    };
-    let config = GradientCheckConfig {
+    let options = GradientCheckOptions {
+        frames: args.frames.map(usize::from),
+        full_size: args.full_size,
         windows: args.windows.into(),
         per_parameter: args.per_parameter,
         seed: args.seed,
     };
-    let report = GradientReport::of(&model, args.frames.map(usize::from), config)?;
+    let report = GradientReport::of(&*experiment.model, &options)?;
     write!(std::io::stdout(), "{report}")?;
     Ok(report.verdict()?)
 }

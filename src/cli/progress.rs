@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::notice::notice;
-use crate::models::transition::Schedule;
+use crate::models::Task;
 use crate::training::StepReport;
 
 /// Time between two lines where there is no terminal for a progress bar.
@@ -27,26 +27,26 @@ pub struct Progress {
 
 impl Progress {
     /// `before`: frames that earlier processes predicted of the schedule's.
-    pub fn new(schedule: &Schedule, before: u64) -> Self {
+    pub fn new(task: &dyn Task<f32>, before: u64) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}")
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar = ProgressBar::new(schedule.frame_steps()).with_style(style);
+            let bar = ProgressBar::new(task.frame_steps()).with_style(style);
             bar.set_position(before);
             bar
         });
-        let mut progress = Self::lines(String::new(), schedule, before);
+        let mut progress = Self::lines(String::new(), task, before);
         progress.bar = bar;
         progress
     }
 
     /// Lines that begin with a name, for a training that is not the only one; `before` as in [`Progress::new`].
-    pub fn lines(name: String, schedule: &Schedule, before: u64) -> Self {
+    pub fn lines(name: String, task: &dyn Task<f32>, before: u64) -> Self {
         Self {
             bar: None,
             name,
-            steps: schedule.steps(),
-            frame_steps: schedule.frame_steps(),
+            steps: task.steps(),
+            frame_steps: task.frame_steps(),
             begun: Instant::now(),
             before,
             line: None,
@@ -59,12 +59,13 @@ impl Progress {
         let done = (report.frame_steps - self.before) as f64;
         let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
         let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
+        let length = report.column("length");
+        let length = length.map_or_else(String::new, |length| format!("  N {length}"));
         let what = format!(
-            "{}step {}/{}  N {}  loss {:.4}  {rate:.0} frames/s  {} left",
+            "{}step {}/{}{length}  loss {:.4}  {rate:.0} frames/s  {} left",
             self.name,
             report.step,
             self.steps,
-            report.length,
             report.total,
             HumanDuration(Duration::from_secs(left as u64))
         );

@@ -14,10 +14,10 @@ use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
 use super::train;
 use super::watched::evaluate_watched;
-use crate::data::DanceClip;
-use crate::evaluation::{self, EvaluationError, Protocol, paper};
+use crate::data::{DataPart, Dataset};
+use crate::evaluation::{Evaluation, EvaluationError, Protocol};
 use crate::experiment::{Ending, Observer, ReproduceError, Reproduction, Row, Seeds, rows};
-use crate::models::transition::TransitionModel;
+use crate::models::Generator;
 use crate::training::{Resumed, StepReport, Trainer, TrainingError};
 
 /// Train and evaluate every config of a folder, and write tables, figures and a manifest
@@ -81,9 +81,13 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 /// Configs or data cannot be used; results or a run are of another config or other data; a training diverged (the other rows are
 /// trained all the same); a file cannot be written.
 pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
-    let order = paper::ROWS.map(|row| row.name);
-    let budget = args.budget.as_deref();
-    let rows = rows::read(&args.configs, budget, &args.set, &args.seeds, &order)?;
+    let (rows, printed) = rows::read(
+        &args.configs,
+        args.budget.as_deref(),
+        &args.set,
+        &args.only,
+        &args.seeds,
+    )?;
     let chosen = rows::chosen(&rows, &args.only, &args.configs)?;
     let runs = match (&args.runs, args.out.file_name()) {
         (Some(runs), _) => runs.clone(),
@@ -102,6 +106,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         rows: &rows,
         chosen: &chosen,
         dataset: &dataset,
+        printed: &printed,
         out: &args.out,
         runs: &runs,
         threads: args.threads.shared(args.jobs).count(),
@@ -165,23 +170,23 @@ impl Observer for Terminal {
         resumed: &Resumed,
     ) -> io::Result<Box<dyn FnMut(&StepReport)>> {
         train::goes_on(resumed)?;
-        let (schedule, before) = (trainer.schedule(), trainer.frame_steps_done());
+        let (task, before) = (trainer.task(), trainer.frame_steps_done());
         let mut progress = match self.alone {
-            true => Progress::new(schedule, before),
-            false => Progress::lines(format!("{}: ", row.folder), schedule, before),
+            true => Progress::new(task, before),
+            false => Progress::lines(format!("{}: ", row.folder), task, before),
         };
         Ok(Box::new(move |report| progress.step(report)))
     }
 
     fn evaluate(
         &self,
-        protocol: &Protocol,
-        model: &dyn TransitionModel,
-        clips: &[DanceClip],
-    ) -> Result<evaluation::Outcome, EvaluationError> {
+        protocol: &dyn Protocol,
+        model: &dyn Generator,
+        dataset: &Dataset,
+    ) -> Result<Evaluation, EvaluationError> {
         match self.alone {
-            true => evaluate_watched(protocol, model, clips),
-            false => protocol.evaluate(model, clips),
+            true => evaluate_watched(protocol, model, dataset, DataPart::Test),
+            false => protocol.evaluate(model, dataset, DataPart::Test),
         }
     }
 

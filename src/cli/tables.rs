@@ -3,9 +3,10 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::Args;
 
-use crate::evaluation::{TableRow, markdown_tables};
+use crate::evaluation::{TableRow, Tables};
 use crate::experiment::EvaluatedRun;
 use crate::run::replace_file;
 
@@ -24,10 +25,14 @@ pub struct TablesArgs {
 pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let runs = EvaluatedRun::read_all(&args.runs)?;
     let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();
-    let measured_on = runs
-        .first()
-        .map_or_else(String::new, |run| run.record.data.caption());
-    replace_file(&args.out, markdown_tables(&rows, &measured_on).as_bytes())?;
+    let first = runs.first().context("no run was given")?;
+    let protocol = first.config.protocol();
+    let tables = Tables {
+        metrics: protocol.metrics(),
+        printed: &first.config.printed()?,
+    };
+    let text = tables.markdown(&rows, &first.record.data.caption());
+    replace_file(&args.out, text.as_bytes())?;
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(())
 }

@@ -56,7 +56,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     } else {
         RunFolder::create(&args.out, &config)?
     };
-    let mut progress = Progress::new(trainer.schedule(), trainer.frame_steps_done());
+    let mut progress = Progress::new(trainer.task(), trainer.frame_steps_done());
     let stop = Stop::on_signal()?;
     let outcome = trainer.run(Some(&run), &mut |report| {
         progress.step(report);
@@ -73,7 +73,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Outcome::Stopped => {
-            let (done, all) = (trainer.steps_done(), trainer.schedule().steps());
+            let (done, all) = (trainer.steps_done(), trainer.task().steps());
             notice(format_args!(
                 "stopped and saved after step {done} of {all}; go on with\n  {}",
                 resume_command(&args)
@@ -88,20 +88,18 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
 /// # Errors
 /// The output cannot be written.
 pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
-    let schedule = trainer.schedule();
+    let task = trainer.task();
+    let summary = task.summary().map(|summary| format!("{summary}, "));
     writeln!(
         io::stdout(),
-        "{} parameters; {} epochs, {} steps, {} frame-steps; {threads} threads",
+        "{} parameters; {}{} steps, {} frame-steps; {threads} threads",
         trainer.parameters().weights(),
-        schedule.epochs(),
-        schedule.steps(),
-        schedule.frame_steps(),
+        summary.unwrap_or_default(),
+        task.steps(),
+        task.frame_steps(),
     )?;
-    let skipped = schedule.skipped_lengths();
-    if let (Some(first), Some(last)) = (skipped.first(), skipped.last()) {
-        notice(format_args!(
-            "warning: no training clip is long enough for transitions of {first} to {last} frames: skipped"
-        ));
+    for warning in task.warnings() {
+        notice(format_args!("warning: {warning}"));
     }
     Ok(())
 }

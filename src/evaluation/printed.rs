@@ -18,6 +18,12 @@ pub struct PrintedTables {
     /// One table a metric, in the order in which they are shown.
     #[serde(default)]
     pub tables: Vec<PrintedTable>,
+    /// Rows whose printed values a figure draws beside ours; those of all would bury ours.
+    #[serde(default)]
+    pub dashed: Vec<String>,
+    /// The row whose printed values a figure draws in any case.
+    #[serde(default)]
+    pub goal: Option<String>,
     /// Rows by the names of their configs, in the paper's order.
     #[serde(default, deserialize_with = "rows")]
     pub rows: Vec<PrintedRow>,

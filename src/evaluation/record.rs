@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::scores::Evaluation;
-use crate::data::{DanceClip, DataPart, Dataset, EmptyPart};
+use super::Scores;
+use crate::data::{DataPart, Dataset, EmptyPart, Recording};
 use crate::report::thousands;
 use crate::run::{FileError, write_json};
 
@@ -66,7 +66,7 @@ impl EvaluatedData {
         Ok(Self {
             part,
             clips: clips.len(),
-            frames: clips.iter().map(DanceClip::frames).sum(),
+            frames: clips.iter().map(Recording::frames).sum(),
             data_digest: dataset.digest.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
@@ -87,17 +87,17 @@ impl EvaluatedData {
 /// Scores and what they were measured on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationRecord {
-    pub evaluation: Evaluation,
+    pub scores: Scores,
     pub data: EvaluatedData,
 }
 
 /// The JSON of scores. Those on the test clips are no more than the scores.
 #[derive(Serialize)]
-struct Scores<'a> {
+struct ScoresFile<'a> {
     #[serde(skip_serializing_if = "DataPart::is_test")]
     clips: DataPart,
     #[serde(flatten)]
-    evaluation: &'a Evaluation,
+    scores: &'a Scores,
 }
 
 impl EvaluationRecord {
@@ -118,9 +118,9 @@ impl EvaluationRecord {
     /// # Errors
     /// The file cannot be written.
     pub fn write_scores(&self, path: &Path) -> Result<(), FileError> {
-        let scores = Scores {
+        let scores = ScoresFile {
             clips: self.data.part,
-            evaluation: &self.evaluation,
+            scores: &self.scores,
         };
         write_json(path, &scores)
     }
@@ -148,7 +148,7 @@ impl EvaluationRecord {
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let [scores, data] = Self::files(DataPart::Test);
         let record = Self {
-            evaluation: read_json(folder, scores)?,
+            scores: read_json(folder, scores)?,
             data: read_json(folder, data)?,
         };
         if !record.data.part.is_test() {

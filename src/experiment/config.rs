@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::data::DataConfig;
+use crate::evaluation::{EvaluationOptions, PrintedError, PrintedTables, Protocol};
+use crate::models::registry;
 use crate::models::settings::{ModelSettings, ValueError};
 use crate::optim::AdamConfig;
 
@@ -113,6 +115,26 @@ impl Default for ValidationConfig {
 }
 
 impl ExperimentConfig {
+    /// How the model's tables score it.
+    pub fn protocol(&self) -> Box<dyn Protocol> {
+        self.model
+            .protocol(&self.data, &EvaluationOptions::default())
+    }
+
+    /// What the paper of its model prints.
+    ///
+    /// # Errors
+    /// A model from outside whose paper's numbers are no such file.
+    pub fn printed(&self) -> Result<PrintedTables, PrintedError> {
+        match registry::find(self.model.kind()) {
+            Some(kind) => {
+                let paper = kind.paper();
+                PrintedTables::parse(paper.printed, &format!("{}/paper.toml", paper.name))
+            }
+            None => Ok(PrintedTables::default()),
+        }
+    }
+
     /// Checks every value by itself and against the others.
     ///
     /// # Errors

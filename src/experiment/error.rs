@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::{ConfigError, ValueError};
+use super::ConfigError;
 use crate::data::{DataError, EmptyPart};
-use crate::evaluation::{EvaluationError, RecordError};
+use crate::evaluation::{EvaluationError, PrintedError, RecordError};
+use crate::models::settings::ValueError;
 use crate::report::FigureError;
-use crate::run::FileError;
+use crate::run::{FileError, RunError};
 use crate::training::TrainingError;
 
 /// How results that are in the way are made again.
@@ -78,6 +79,10 @@ pub enum ReproduceError {
     Data(#[from] DataError),
     #[error(transparent)]
     EmptyPart(#[from] EmptyPart),
+    #[error(transparent)]
+    Printed(#[from] PrintedError),
+    #[error(transparent)]
+    Run(#[from] RunError),
     #[error(transparent)]
     Training(#[from] TrainingError),
     #[error(transparent)]

@@ -1,12 +1,12 @@
 //! Runs' folders that `keydance evaluate` has been through, side by side.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::ExperimentConfig;
 use crate::evaluation::{EvaluationRecord, RecordError, TableRow};
 use crate::report::{NO_TRAINING, schedule_note};
-use crate::run::{Manifest, RunFolder};
-use crate::training::TrainingError;
+use crate::run::{Manifest, RunError, RunFolder};
 
 /// Why runs' scores do not stand in one table.
 #[derive(Debug, thiserror::Error)]
@@ -14,7 +14,7 @@ pub enum EvaluatedError {
     #[error(transparent)]
     Record(#[from] RecordError),
     #[error(transparent)]
-    Run(#[from] TrainingError),
+    Run(#[from] RunError),
     /// Both as what was measured on what.
     #[error("scores of different data do not stand in one table: {0}, but {1}")]
     OtherData(String, String),
@@ -23,7 +23,7 @@ pub enum EvaluatedError {
 /// A run with its scores.
 pub struct EvaluatedRun {
     folder: PathBuf,
-    config: ExperimentConfig,
+    pub config: ExperimentConfig,
     /// None where nothing was trained.
     manifest: Option<Manifest>,
     pub record: EvaluationRecord,
@@ -66,7 +66,7 @@ impl EvaluatedRun {
         TableRow {
             name: self.config.name.clone(),
             seed: self.manifest.as_ref().map(|manifest| manifest.seed),
-            evaluation: Some(self.record.evaluation.clone()),
+            scores: Some(self.record.scores.clone()),
             schedule_note: self.manifest.as_ref().map_or_else(
                 || NO_TRAINING.into(),
                 |manifest| schedule_note(&self.config, manifest),
@@ -77,19 +77,20 @@ impl EvaluatedRun {
     /// Scores stand side by side only if they were measured on the same windows.
     fn on_the_data_of(&self, other: &Self) -> bool {
         let (ours, theirs) = (&self.record, &other.record);
-        ours.evaluation.windows == theirs.evaluation.windows
+        ours.scores.windows() == theirs.scores.windows()
             && (ours.data.clips, ours.data.frames) == (theirs.data.clips, theirs.data.frames)
             && ours.data.data_digest == theirs.data.data_digest
     }
 
     fn measured(&self) -> String {
         let data = &self.record.data;
+        let windows: BTreeMap<_, _> = self.record.scores.windows().iter().cloned().collect();
         format!(
             "{} on {} test clips ({} frames, windows by length {:?}) of data with digest {}",
             self.folder.display(),
             data.clips,
             data.frames,
-            self.record.evaluation.windows,
+            windows,
             data.data_digest
         )
     }

@@ -1,4 +1,4 @@
-//! What `keydance reproduce` writes beside the rows: tables, the figure of LRP over transition length, and a manifest of everything.
+//! What `keydance reproduce` writes beside the rows: tables, a figure of the first metric, and a manifest of everything.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,12 +10,11 @@ use super::ReproduceError;
 use super::results::{RowResults, table_row};
 use super::rows::Row;
 use crate::data::hexadecimal;
-use crate::evaluation::{EvaluationRecord, TableRow, markdown_tables};
-use crate::report::figures::lrp_figure;
+use crate::evaluation::{EvaluationRecord, PrintedTables, TableRow, Tables};
+use crate::report::score_figure;
 use crate::run::{FileError, RunFolder, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
-const FIGURE: &str = "lrp.svg";
 const MANIFEST: &str = "manifest.json";
 
 /// A row with what there is of it.
@@ -57,7 +56,12 @@ struct ManifestRow<'r> {
 ///
 /// # Errors
 /// A file cannot be read or written.
-pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> Result<(), ReproduceError> {
+pub fn write(
+    out: &Path,
+    rows: &[Reported<'_>],
+    printed: &PrintedTables,
+    data_digest: &str,
+) -> Result<(), ReproduceError> {
     let table_rows: Vec<TableRow> = rows
         .iter()
         .map(|reported| {
@@ -73,10 +77,20 @@ pub fn write(out: &Path, rows: &[Reported<'_>], data_digest: &str) -> Result<(),
     let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {
         return Ok(());
     };
-    let tables = markdown_tables(&table_rows, &record.data.caption());
-    replace_file(&out.join(TABLES), tables.as_bytes())?;
-    replace_file(&out.join(FIGURE), lrp_figure(&table_rows)?.as_bytes())?;
-    let mut files: Vec<PathBuf> = [TABLES, FIGURE].map(|name| out.join(name)).into();
+    let protocol = rows[0].row.config.protocol();
+    let tables = Tables {
+        metrics: protocol.metrics(),
+        printed,
+    };
+    let text = tables.markdown(&table_rows, &record.data.caption());
+    let mut files: Vec<PathBuf> = vec![out.join(TABLES)];
+    replace_file(&files[0], text.as_bytes())?;
+    if let Some(metric) = protocol.metrics().first() {
+        let figure = out.join(metric.key).with_extension("svg");
+        let drawn = score_figure(metric, printed, &table_rows)?;
+        replace_file(&figure, drawn.as_bytes())?;
+        files.push(figure);
+    }
     files.extend(rows.iter().flat_map(|reported| reported.results.files()));
     let manifest = Manifest {
         data_digest,

@@ -12,10 +12,10 @@ use super::ReproduceError;
 use super::report::{self, Reported};
 use super::results::RowResults;
 use super::rows::Row;
-use crate::data::{DanceClip, DataPart, Dataset};
-use crate::evaluation::{self, Evaluation, EvaluationError, Protocol};
-use crate::models::transition::TransitionModel;
-use crate::run::{RunFolder, RunState};
+use crate::data::{DataPart, Dataset};
+use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, Scores};
+use crate::models::Generator;
+use crate::run::{RunError, RunFolder, RunState};
 use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
 
 /// Is told how a reproduction goes, by several threads where several rows are trained at the same time, and may stop it.
@@ -45,14 +45,14 @@ pub trait Observer: Sync {
         resumed: &Resumed,
     ) -> io::Result<Box<dyn FnMut(&StepReport)>>;
 
-    /// Evaluates a model as `protocol` says: whoever shows how far that is wraps the model.
+    /// Evaluates a model on the test clips as `protocol` says: whoever shows how far that is wraps the model.
     fn evaluate(
         &self,
-        protocol: &Protocol,
-        model: &dyn TransitionModel,
-        clips: &[DanceClip],
-    ) -> Result<evaluation::Outcome, EvaluationError> {
-        protocol.evaluate(model, clips)
+        protocol: &dyn Protocol,
+        model: &dyn Generator,
+        dataset: &Dataset,
+    ) -> Result<Evaluation, EvaluationError> {
+        protocol.evaluate(model, dataset, DataPart::Test)
     }
 
     /// Whether to stop after the step at hand.
@@ -66,6 +66,8 @@ pub struct Reproduction<'a> {
     /// Those to train and evaluate; the tables keep what there is of the others.
     pub chosen: &'a [&'a Row],
     pub dataset: &'a Dataset,
+    /// What the paper prints.
+    pub printed: &'a PrintedTables,
     /// Folder for the results.
     pub out: &'a Path,
     /// Folder for the runs.
@@ -207,7 +209,7 @@ impl Reproduction<'_> {
             _ => config.differences(&row.config)?,
         };
         if !differences.is_empty() {
-            return Err(TrainingError::OtherConfig {
+            return Err(RunError::OtherConfig {
                 path: run.config_path(),
                 differences,
             }
@@ -215,7 +217,7 @@ impl Reproduction<'_> {
         }
         match manifest {
             Some(manifest) if manifest.data_digest != self.dataset.digest => {
-                Err(TrainingError::OtherData {
+                Err(RunError::OtherData {
                     path: run.path().into(),
                     saved: manifest.data_digest,
                     found: self.dataset.digest.clone(),
@@ -235,13 +237,9 @@ impl Reproduction<'_> {
                 .note(&format!("done, see {}", folder.display()))?;
             return Ok(RowOutcome::Done);
         }
-        let untrained = row
-            .config
-            .model
-            .untrained(row.config.data.contact_threshold);
-        if let Some(model) = untrained {
-            let evaluation = self.evaluate(model.as_ref())?;
-            results.write(row, None, evaluation, self.dataset)?;
+        if let Some(model) = row.config.model.untrained(&row.config.data) {
+            let scores = self.evaluate(row, &*model)?;
+            results.write(row, None, scores, self.dataset)?;
             return Ok(RowOutcome::Done);
         }
         let run = self.run_of(row);
@@ -262,8 +260,8 @@ impl Reproduction<'_> {
                 Err(error) => return Err(error),
             }
         }
-        let evaluation = self.evaluate(&run.trained_model(&row.config)?)?;
-        results.write(row, Some(&run), evaluation, self.dataset)?;
+        let scores = self.evaluate(row, &*run.trained_model(&row.config)?)?;
+        results.write(row, Some(&run), scores, self.dataset)?;
         Ok(RowOutcome::Done)
     }
 
@@ -283,19 +281,19 @@ impl Reproduction<'_> {
         Ok(outcome?)
     }
 
-    fn evaluate(&self, model: &dyn TransitionModel) -> Result<Evaluation, ReproduceError> {
+    fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<Scores, ReproduceError> {
         let threads = self.threads;
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .map_err(|cause| ReproduceError::Threads { threads, cause })?;
-        let protocol = Protocol::default();
-        let clips = &self.dataset.test;
-        let outcome = pool.install(|| self.observer.evaluate(&protocol, model, clips))?;
-        for skipped in &outcome.skipped {
-            self.observer.warning(&skipped.to_string());
+        let protocol = row.config.protocol();
+        let evaluation =
+            pool.install(|| self.observer.evaluate(&*protocol, model, self.dataset))?;
+        for warning in &evaluation.warnings {
+            self.observer.warning(warning);
         }
-        Ok(outcome.evaluation)
+        Ok(evaluation.scores)
     }
 
     /// Writes tables, figures and manifest from what there is.
@@ -313,6 +311,6 @@ impl Reproduction<'_> {
                 })
             })
             .collect::<Result<_, ReproduceError>>()?;
-        report::write(self.out, &reported, &self.dataset.digest)
+        report::write(self.out, &reported, self.printed, &self.dataset.digest)
     }
 }

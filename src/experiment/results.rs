@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::ReproduceError;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{EvaluatedData, Evaluation, EvaluationRecord, TableRow};
+use crate::evaluation::scores::AVERAGE;
+use crate::evaluation::{EvaluatedData, EvaluationRecord, Scores, TableRow};
 use crate::report::{
     LossSeries, NO_TRAINING, ValidationSeries, loss_curve, schedule_note, thousands,
     validation_curve,
@@ -78,7 +79,7 @@ impl RowResults {
         &self,
         row: &Row,
         run: Option<&RunFolder>,
-        evaluation: Evaluation,
+        scores: Scores,
         dataset: &Dataset,
     ) -> Result<(), ReproduceError> {
         let path = self.folder.path();
@@ -91,7 +92,7 @@ impl RowResults {
             self.write_curves(row, &run.log()?)?;
         }
         let data = EvaluatedData::of(dataset, DataPart::Test)?;
-        Ok(EvaluationRecord { evaluation, data }.write(path)?)
+        Ok(EvaluationRecord { scores, data }.write(path)?)
     }
 
     fn write_curves(&self, row: &Row, log: &[LogLine]) -> Result<(), ReproduceError> {
@@ -120,28 +121,36 @@ impl RowResults {
             series.push(losses(name, &|line| line.losses.get(name).copied()));
         }
         write(LOSS_CURVE, loss_curve(&title("Losses"), &series)?)?;
-        let scored: Vec<(f64, &Evaluation)> = log
+        let scored: Vec<(f64, &Scores)> = log
             .iter()
             .filter_map(|line| Some((line.frame_steps as f64, line.validation.as_ref()?)))
             .collect();
         let Some((_, last)) = scored.last() else {
             return Ok(());
         };
-        let by_length: Vec<ValidationSeries> = last
-            .lrp
-            .lengths()
-            .map(|length| ValidationSeries {
-                length,
+        let protocol = row.config.protocol();
+        let Some((metric, row)) = protocol
+            .metrics()
+            .iter()
+            .find_map(|metric| Some((metric, last.row(metric.key)?)))
+        else {
+            return Ok(());
+        };
+        let columns = row.columns().filter(|column| *column != AVERAGE);
+        let by_column: Vec<ValidationSeries> = columns
+            .map(|column| ValidationSeries {
+                column: column.into(),
                 points: scored
                     .iter()
                     .filter_map(|(frame_steps, scores)| {
-                        Some((*frame_steps, scores.lrp.at(length)?))
+                        Some((*frame_steps, scores.row(metric.key)?.at(column)?))
                     })
                     .collect(),
             })
             .collect();
-        let title = title("LRP on validation clips");
-        write(VALIDATION_CURVE, validation_curve(&title, &by_length)?)
+        let title = title(&format!("{} on validation clips", metric.title));
+        let curve = validation_curve(&title, metric, &by_column)?;
+        write(VALIDATION_CURVE, curve)
     }
 
     /// Files that are there, by their names.
@@ -190,7 +199,7 @@ pub fn table_row(
     Ok(TableRow {
         name: row.config.name.clone(),
         seed: row.is_trained().then_some(row.config.seed),
-        evaluation: record.map(|record| record.evaluation.clone()),
+        scores: record.map(|record| record.scores.clone()),
         schedule_note: note,
     })
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{ExperimentConfig, ReproduceError};
 use crate::data::Dataset;
+use crate::evaluation::PrintedTables;
 
 /// A model, trained from one seed.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +17,7 @@ pub struct Row {
 impl Row {
     /// Whether it has weights to train.
     pub fn is_trained(&self) -> bool {
-        let threshold = self.config.data.contact_threshold;
-        self.config.model.untrained(threshold).is_none()
+        self.config.model.untrained(&self.config.data).is_none()
     }
 }
 
@@ -28,7 +28,13 @@ pub struct Seeds {
     pub seeds: Vec<u64>,
 }
 
-/// All rows of a folder of configs: first every model once, those of `order` before the others, which go by name, then further seeds.
+/// The file of a folder of configs that holds what the paper prints.
+const PRINTED: &str = "paper.toml";
+
+/// All rows of a folder of configs, and what the paper prints: first every model once, in the paper's order and then by name,
+/// then further seeds.
+///
+/// Where `only` names some rows, `sets` reach the others as far as they know the key.
 ///
 /// # Errors
 /// The folder holds no config, one is bad, two have the same name, or seeds are given for a model that is not there.
@@ -36,13 +42,24 @@ pub fn read(
     folder: &Path,
     budget: Option<&Path>,
     sets: &[String],
+    only: &[String],
     seeds: &[Seeds],
-    order: &[&str],
-) -> Result<Vec<Row>, ReproduceError> {
+) -> Result<(Vec<Row>, PrintedTables), ReproduceError> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
-        let config = ExperimentConfig::load_under(&file, budget, sets)
-            .map_err(|source| ReproduceError::NoRow { file, source })?;
+        let load = |sets: &[String]| ExperimentConfig::load_under(&file, budget, sets);
+        let no_row = |source| ReproduceError::NoRow {
+            file: file.clone(),
+            source,
+        };
+        let name = load(&[]).map_err(no_row)?.name;
+        let config = if only.is_empty() || only.contains(&name) {
+            load(sets).map_err(no_row)?
+        } else {
+            let knows = |set: &&String| load(std::slice::from_ref(*set)).is_ok();
+            let known: Vec<String> = sets.iter().filter(knows).cloned().collect();
+            load(&known).map_err(no_row)?
+        };
         if configs.iter().any(|other| other.name == config.name) {
             return Err(ReproduceError::SameName {
                 folder: folder.into(),
@@ -51,7 +68,11 @@ pub fn read(
         }
         configs.push(config);
     }
-    let place = |name: &str| order.iter().position(|other| *other == name);
+    let printed = match std::fs::read_to_string(folder.join(PRINTED)) {
+        Ok(text) => PrintedTables::parse(&text, &folder.join(PRINTED).display().to_string())?,
+        Err(_) => configs[0].printed()?,
+    };
+    let place = |name: &str| printed.rows.iter().position(|row| row.name == name);
     configs.sort_by_key(|config| {
         (
             place(&config.name).unwrap_or(usize::MAX),
@@ -90,7 +111,7 @@ pub fn read(
                 source,
             })?;
     }
-    Ok(rows)
+    Ok((rows, printed))
 }
 
 /// The rows whose models `--only` names; all without it.
@@ -160,7 +181,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ReproduceError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if path.extension().is_some_and(|end| end == "toml") {
+        let is_config = path.extension().is_some_and(|end| end == "toml");
+        if is_config && path.file_name().is_some_and(|name| name != PRINTED) {
             files.push(path);
         }
     }

@@ -9,6 +9,7 @@
 #[cfg(feature = "papers")]
 pub mod baselines;
 pub mod generator;
+pub mod gradient_report;
 #[cfg(feature = "papers")]
 pub mod harvey2020;
 #[cfg(feature = "papers")]

@@ -68,6 +68,11 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// The first value out of its range.
     fn check(&self, data: &DataConfig) -> Result<(), ValueError>;
 
+    /// How much of its schedule is trained, in its own words, for the caption of a table.
+    fn budget_note(&self) -> String {
+        String::new()
+    }
+
     /// The groups of learning rates that its parameters fall into, see [`Task::rate_group`].
     fn rate_groups(&self) -> &'static [&'static str] {
         &[]

@@ -387,7 +387,7 @@ mod tests {
             ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6)
         };
         let mut parameters = parameters::<f64>(&[&start]);
-        let mut adam = Adam::new(config, &parameters, |_| None);
+        let mut adam = Adam::new(config.clone(), &parameters, |_| None);
         for t in 0..20 {
             // Two shards that add up to the gradient.
             let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
@@ -404,7 +404,7 @@ mod tests {
         for (i, (w, start)) in weights(&parameters).into_iter().zip(start).enumerate() {
             let history: Vec<f64> = (0..20).map(|t| gradient(t, i)).collect();
             assert!(
-                (w - naive(config, start, &history)).abs() < 1e-12,
+                (w - naive(config.clone(), start, &history)).abs() < 1e-12,
                 "weight {i}"
             );
         }

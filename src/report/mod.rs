@@ -5,25 +5,27 @@
 pub mod camera;
 pub mod chart;
 mod dancer;
+#[cfg(feature = "papers")]
 pub mod demo;
+#[cfg(feature = "papers")]
 pub mod figures;
 pub mod loss_curve;
-pub mod lrp_curve;
 pub mod motion_figure;
 pub mod root_panel;
 mod run_table;
 mod schedule_note;
+mod score_figure;
 pub mod svg;
 mod thousands;
 pub mod validation_curve;
 pub mod viewer;
 
 pub use loss_curve::{LossSeries, loss_curve};
-pub use lrp_curve::{LrpSeries, lrp_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};
 pub use run_table::RunTable;
 pub use schedule_note::{NO_TRAINING, schedule_note};
+pub use score_figure::{ScoreSeries, score_curve, score_figure};
 pub use thousands::thousands;
 pub use validation_curve::{ValidationSeries, validation_curve};
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use super::thousands;
 use crate::evaluation::EvaluationRecord;
 use crate::experiment::ExperimentConfig;
-use crate::run::{RunFolder, RunProgress, RunStatus};
-use crate::training::TrainingError;
+use crate::run::{RunError, RunFolder, RunProgress, RunStatus};
 
 /// Folders inside folders that are looked through for runs.
 const DEEPEST: usize = 4;
@@ -120,7 +119,7 @@ impl Row {
         row
     }
 
-    fn fill(&mut self, run: &RunFolder) -> Result<(), TrainingError> {
+    fn fill(&mut self, run: &RunFolder) -> Result<(), RunError> {
         // First what needs no config: it may be of another version.
         let progress = run.progress()?;
         if let Some(progress) = &progress {
@@ -146,12 +145,12 @@ impl Row {
     }
 
     fn score(&mut self, record: &EvaluationRecord) {
-        let EvaluationRecord { evaluation, data } = record;
+        let EvaluationRecord { scores, data } = record;
         if self.cells[11].is_empty() {
             self.cells[11] = version(&data.version, data.commit.as_deref());
         }
         for (cell, length) in self.cells[7..].iter_mut().zip(LENGTHS) {
-            if let Some(score) = evaluation.lrp.at(length) {
+            if let Some(score) = scores.row("lrp").and_then(|row| row.at(length)) {
                 *cell = format!("{score:.1}");
             }
         }
@@ -166,7 +165,7 @@ fn version(version: &str, commit: Option<&str>) -> String {
 
 fn state(config: &ExperimentConfig, progress: Option<&RunProgress>, run: &RunFolder) -> String {
     let Some(progress) = progress else {
-        let untrained = config.model.untrained(config.data.contact_threshold);
+        let untrained = config.model.untrained(&config.data);
         return if untrained.is_some() {
             "needs no training"
         } else {

@@ -12,19 +12,19 @@ pub const NO_TRAINING: &str = "needs no training";
 pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
     let done = manifest.frame_steps_done;
     let mut note = format!("{} frame-steps", thousands(done));
-    if let Some(whole) = manifest.whole_schedule_frame_steps {
+    if let Some(whole) = manifest.fact::<u64>("whole_schedule_frame_steps") {
         note += &format!(
             " ({:.3} % of the whole schedule's {})",
             100.0 * done as f64 / whole as f64,
             thousands(whole)
         );
     }
-    note += &format!(
-        ", schedule.fraction {}, batch size {}, {}",
-        config.schedule.fraction,
-        config.schedule.batch_size,
-        learning_rate(&config.optimiser)
-    );
+    let budget = config.model.budget_note();
+    for part in [budget, learning_rate(&config.optimiser)] {
+        if !part.is_empty() {
+            note += &format!(", {part}");
+        }
+    }
     if manifest.state != RunState::Finished {
         note += &format!(
             "; not finished: {} of {} steps",
@@ -37,8 +37,8 @@ pub fn schedule_note(config: &ExperimentConfig, manifest: &Manifest) -> String {
 fn learning_rate(optimiser: &AdamConfig) -> String {
     let rate = optimiser.learning_rate;
     let mut text = format!("learning rate {rate}");
-    if let Some(rate) = optimiser.transformer_learning_rate {
-        text += &format!(" ({rate} for Transformers)");
+    for (group, rate) in &optimiser.rates {
+        text += &format!(" ({rate} for {group})");
     }
     let Some(schedule) = optimiser.rate_schedule else {
         return text;

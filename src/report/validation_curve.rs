@@ -1,25 +1,31 @@
-//! LRP over the course of a training: whether more of it would still help.
+//! A metric over the course of a training: whether more of it would still help.
 
 use super::FigureError;
 use super::chart::{Axis, Chart, Line};
+use super::score_figure::metric_axis;
+use crate::evaluation::Metric;
 
-/// LRP at one transition length.
+/// Scores in one column of a metric's table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValidationSeries {
-    /// N, frames.
-    pub length: usize,
-    /// `(frame-steps, LRP in cm)`, ascending in frame-steps.
+    /// Such as a transition length N, frames.
+    pub column: String,
+    /// `(frame-steps, score)`, ascending in frame-steps.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Draws LRP (cm, eq. 12) on validation clips over frame-steps, a line for each transition length.
+/// Draws a metric on validation clips over frame-steps, a line for each column.
 ///
 /// # Errors
 ///
 /// [`FigureError`]: no points, or a NaN or infinity.
-pub fn validation_curve(title: &str, lengths: &[ValidationSeries]) -> Result<String, FigureError> {
-    let lines = lengths.iter().enumerate().map(|(index, series)| Line {
-        name: format!("N = {}", series.length),
+pub fn validation_curve(
+    title: &str,
+    metric: &Metric,
+    columns: &[ValidationSeries],
+) -> Result<String, FigureError> {
+    let lines = columns.iter().enumerate().map(|(index, series)| Line {
+        name: format!("N = {}", series.column),
         points: series.points.clone(),
         emphasised: true,
         dashed: false,
@@ -30,7 +36,7 @@ pub fn validation_curve(title: &str, lengths: &[ValidationSeries]) -> Result<Str
         title: title.to_string(),
         caption: String::new(),
         x: Axis::linear("training (frame-steps)"),
-        y: Axis::linear("LRP (cm), lower is better"),
+        y: Axis::linear(&metric_axis(metric)),
         lines: lines.collect(),
     }
     .svg()

@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::durable::{self, FileError};
+use super::error::RunError;
 use super::folder::RunFolder;
 use crate::data::Dataset;
 use crate::experiment::{ConfigError, ExperimentConfig};
-use crate::models::transition::DataRanges;
-use crate::models::transition::TransitionModel;
-use crate::training::TrainingError;
+use crate::models::Generator;
 
 /// Why there is no model to work with, or why it does not go with the data.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +15,7 @@ pub enum SubjectError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     #[error(transparent)]
-    Run(#[from] TrainingError),
+    Run(#[from] RunError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(
@@ -59,13 +58,11 @@ pub enum SubjectError {
 
 pub struct Subject {
     pub config: ExperimentConfig,
-    pub model: Box<dyn TransitionModel>,
+    pub model: Box<dyn Generator>,
     /// What to call it in the output.
     pub what: String,
     /// The run's folder; none for a config.
     pub run: Option<RunFolder>,
-    /// Bounds of the controls in what the model was trained on; none without training.
-    pub ranges: Option<DataRanges>,
 }
 
 impl Subject {
@@ -76,17 +73,15 @@ impl Subject {
     pub fn open(path: &Path, set: &[String]) -> Result<Self, SubjectError> {
         if !path.is_dir() {
             let config = ExperimentConfig::load(path, set)?;
-            let threshold = config.data.contact_threshold;
             let model = config
                 .model
-                .untrained(threshold)
+                .untrained(&config.data)
                 .ok_or_else(|| SubjectError::Untrained { path: path.into() })?;
             return Ok(Self {
                 what: format!("{} of {}", config.name, path.display()),
                 config,
                 model,
                 run: None,
-                ranges: None,
             });
         }
         let run = RunFolder::open(path);
@@ -94,25 +89,12 @@ impl Subject {
             return Err(SubjectError::NoRun { path: path.into() });
         }
         let config = ExperimentConfig::load(&run.config_path(), set)?;
-        let untrained = config.model.untrained(config.data.contact_threshold);
-        let (model, what, ranges) = match untrained {
-            Some(model) => (
-                model,
-                format!("{} of {}", config.name, path.display()),
-                None,
-            ),
+        let (model, what) = match config.model.untrained(&config.data) {
+            Some(model) => (model, format!("{} of {}", config.name, path.display())),
             None => {
-                let model = run.trained_model(&config)?;
-                let saved = run.manifest()?.and_then(|manifest| manifest.data_ranges);
-                let ranges =
-                    saved.unwrap_or_else(|| DataRanges::from_statistics(model.standardisation()));
                 let weights = run.newest_weights()?;
                 let what = format!("{}, {}", config.name, weights.display());
-                (
-                    Box::new(model) as Box<dyn TransitionModel>,
-                    what,
-                    Some(ranges),
-                )
+                (run.trained_model(&config)?, what)
             }
         };
         Ok(Self {
@@ -120,7 +102,6 @@ impl Subject {
             model,
             what,
             run: Some(run),
-            ranges,
         })
     }
 

@@ -7,7 +7,8 @@ use std::str::FromStr;
 use ndarray::{Array2, ArrayView2, s};
 
 use super::{KeyframeSource, SequenceRequest, SynthesisError};
-use crate::data::{DanceClip, DataConfig, DataError};
+use crate::data::{DataConfig, DataError};
+use crate::models::transition::DanceClip;
 use crate::motion::bvh::{self, BvhError, Channel};
 use crate::motion::features::VELOCITY_FACTORS;
 use crate::motion::{Mapping, MappingError};

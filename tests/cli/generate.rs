@@ -6,7 +6,8 @@ use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use glam::DVec3;
-use keydance::data::{DanceClip, DataConfig};
+use keydance::data::DataConfig;
+use keydance::models::transition::DanceClip;
 use keydance::motion::features::VELOCITY_FACTORS;
 use keydance::motion::{Clip, Mapping, bvh};
 use keydance::synthesis::SequenceRequest;

@@ -1,10 +1,12 @@
 //! Figures: well-formed SVG that shows what it was given.
 
 use glam::DVec3;
+use keydance::evaluation::Protocol as _;
+use keydance::evaluation::equations::Equations;
 use keydance::motion::{DANCE_PARENTS, JOINTS};
 use keydance::report::{
-    FigureError, LossSeries, LrpSeries, MotionFigure, MotionRow, PathView, Placing, RootPaths,
-    Shown, loss_curve, lrp_curve,
+    FigureError, LossSeries, MotionFigure, MotionRow, PathView, Placing, RootPaths, ScoreSeries,
+    Shown, loss_curve, score_curve,
 };
 use roxmltree::{Document, Node};
 
@@ -344,20 +346,20 @@ fn one_point_is_a_chart_too() {
 }
 
 #[test]
-fn the_lrp_curve_has_the_papers_values_dashed_in_the_colour_of_ours() {
+fn the_curve_of_a_metric_has_the_papers_values_dashed_in_the_colour_of_ours() {
     let models = [
-        LrpSeries {
+        ScoreSeries {
             name: "interpolation".into(),
             ours: vec![(10.0, 22.9), (50.0, 95.8), (150.0, 124.0)],
             paper: vec![(10.0, 13.83), (50.0, 87.59), (150.0, 124.47)],
         },
-        LrpSeries {
+        ScoreSeries {
             name: "variant".into(),
             ours: vec![(10.0, 30.0), (150.0, 90.0)],
             paper: Vec::new(),
         },
     ];
-    let svg = lrp_curve("LRP", &models).unwrap();
+    let svg = score_curve("LRP", &Equations::default().metrics()[0], &models).unwrap();
     let document = Document::parse(&svg).unwrap();
     let strokes: Vec<_> = groups(&document, "line")
         .iter()

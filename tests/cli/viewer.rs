@@ -4,12 +4,13 @@
 use std::fs;
 
 use glam::DVec3;
+use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig};
-use keydance::evaluation::window_request;
+use keydance::evaluation::equations::window_request;
 use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::TransitionModel;
 use keydance::models::transition::window_features;
+use keydance::models::transition::{DanceClip, TransitionRequest};
 use keydance::motion::placement::world_positions;
 use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use ndarray::{Axis, concatenate, s};
@@ -31,6 +32,7 @@ fn viewer() -> Viewer {
     let clip = DanceClip::new(clip, None, &DataConfig::default()).unwrap();
     let window = window_features(&clip.features, 20, LENGTH);
     let request = window_request(&clip.clip, 20, window.view()).unwrap();
+    let request = TransitionRequest::of(&request).unwrap();
     let between = Interpolation::default()
         .transitions(std::slice::from_ref(&request))
         .unwrap()

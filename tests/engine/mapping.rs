@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, Dataset, Split};
+use keydance::models::transition::DanceClip;
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::{DANCE_JOINTS, Mapping, resample};
 
@@ -178,9 +179,10 @@ fn martial_arts_clips_go_through_the_pipeline() {
     let dataset = Dataset::load(&folder, &config).unwrap();
     assert_eq!((dataset.train.len(), dataset.test.len()), (6, 2));
     for clip in dataset.train.iter().chain(&dataset.test) {
-        let document = bvh::read(&folder.join(&clip.name)).unwrap();
+        let document = bvh::read(&folder.join(clip.name())).unwrap();
         assert_eq!(clip.frames(), document.frames().div_ceil(4));
-        assert!(clip.features.iter().all(|number| number.is_finite()));
+        let measured = DanceClip::measure(clip.clip.clone(), &config.features()).unwrap();
+        assert!(measured.features.iter().all(|number| number.is_finite()));
         let source = document.to_clip();
         let mapped = mapping
             .apply(&resample(source.clone(), 30.0).unwrap())

@@ -4,11 +4,12 @@ use std::f64::consts::TAU;
 use std::fs;
 
 use assert_cmd::Command;
+use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig};
-use keydance::evaluation::{window_request, window_scores};
+use keydance::evaluation::equations::{window_request, window_scores};
 use keydance::models::baselines::linear_positions::LinearPositions;
 use keydance::models::baselines::zero_velocity::ZeroVelocity;
+use keydance::models::transition::DanceClip;
 use keydance::models::transition::window_features;
 use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
@@ -44,7 +45,7 @@ fn requests(length: usize) -> Vec<(TransitionRequest, Array2<f64>)> {
         let clip = DanceClip::new(clip.clip, None, &DataConfig::default()).unwrap();
         let window = window_features(&clip.features, 30, length);
         let request = window_request(&clip.clip, 30, window.view()).unwrap();
-        (request, window)
+        (TransitionRequest::of(&request).unwrap(), window)
     });
     clips.collect()
 }
@@ -135,12 +136,7 @@ fn zero_velocity_holds_the_first_pose_and_does_not_look_at_the_target() {
                     moved.mapv(|x| x * x).sum().sqrt()
                 })
                 .sum();
-            let scores = window_scores(
-                recorded.view(),
-                &Transition {
-                    frames: frames.clone(),
-                },
-            );
+            let scores = window_scores(recorded.view(), frames.view());
             let scores = scores.unwrap();
             assert!((scores.body_position - distance / length as f64).abs() < 1e-9);
             assert_eq!(scores.root, 0.0);

@@ -12,12 +12,11 @@ use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{Dataset, Split};
 use keydance::experiment::ExperimentConfig;
-use keydance::models::ModelConfig;
 use keydance::models::harvey2020::{Harvey2020, Harvey2020Config};
+use keydance::models::settings::GradientCheckOptions;
+use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
-use keydance::models::transition::gradient_check::{
-    GradientCase, GradientCheckConfig, check_model, generated_batch,
-};
+use keydance::models::transition::gradient_check::{GradientCase, check_model, generated_batch};
 use keydance::models::transition::{Batch, Feed, Network, PoseWindows};
 use keydance::motion::DANCE_PARENTS;
 use keydance::motion::features::{
@@ -36,6 +35,7 @@ use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 
 use crate::generated_data::write_clips;
+use crate::small_training::settings;
 
 fn adversarial() -> Harvey2020Config {
     Harvey2020Config::default()
@@ -113,13 +113,15 @@ fn the_gradients_of_network_and_critics_are_those_of_central_differences_of_thei
                 feed: Feed::Predictions,
                 dropout,
             };
-            let settings = GradientCheckConfig {
+            let options = GradientCheckOptions {
+                frames: None,
+                full_size: false,
                 windows: 2,
                 per_parameter: 3,
                 seed: 1,
             };
             let model = ModelConfig::Harvey2020(config.small());
-            let report = check_model(&model, case, settings).unwrap().unwrap();
+            let report = check_model(&model, case, &options).unwrap().unwrap();
             assert!(report.error() < 1e-5, "{case:?}: {report:?}");
             assert!(50 * report.kinks() <= report.compared(), "{case:?}");
             let critics = |name: &str| name.starts_with("critics.");
@@ -504,7 +506,7 @@ fn the_network_learns_one_window_by_heart() {
         learning_rate: 5e-3,
         ..AdamConfig::default()
     };
-    let mut adam = Adam::new(settings, &built.parameters, |_| false);
+    let mut adam = Adam::new(settings.clone(), &built.parameters, |_| None);
     let mut gradients = [Gradients::zeros(&built.parameters)];
     let mut workspace = Workspace::new();
     let mut position = Vec::new();
@@ -540,12 +542,13 @@ fn the_network_learns_one_window_by_heart() {
 fn training() -> (ExperimentConfig, Dataset) {
     let mut config = ExperimentConfig::default();
     config.data.split = Split::Share(0.8);
-    config.model = ModelConfig::Harvey2020(adversarial().small());
-    config.schedule.min_len = 9;
-    config.schedule.max_len = 12;
-    config.schedule.batch_size = 16;
-    config.schedule.shards = 4;
-    config.schedule.fraction = 0.1;
+    let own = settings(&mut config);
+    own.model = ModelConfig::Harvey2020(adversarial().small());
+    own.schedule.min_len = 9;
+    own.schedule.max_len = 12;
+    own.schedule.batch_size = 16;
+    own.schedule.shards = 4;
+    own.schedule.fraction = 0.1;
     let clips = generate(&ChoreographyConfig {
         clips: 5,
         frames_per_clip: 90,
@@ -564,12 +567,12 @@ fn training_is_the_same_to_the_bit_on_any_threads_and_after_a_resume() {
     whole
         .run(None, &mut |report| {
             assert!(report.losses.iter().any(|(name, _)| *name == "critics"));
-            feeds.push(report.feed);
+            feeds.push(report.column("feed").unwrap() == "predictions");
             ControlFlow::Continue(())
         })
         .unwrap();
     // Whatever scheduled sampling draws, which is nearly always the truth in so short a training.
-    assert!(feeds.len() > 5 && feeds.iter().all(|&feed| feed == Feed::Predictions));
+    assert!(feeds.len() > 5 && feeds.iter().all(|&fed_back| fed_back));
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("run");
     let run = RunFolder::create(&path, &config).unwrap();

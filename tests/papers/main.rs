@@ -11,6 +11,7 @@ mod small_training;
 
 // The tests.
 mod baselines;
+mod config_layers;
 mod golden;
 mod golden_run;
 mod harvey2020;

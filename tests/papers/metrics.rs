@@ -1,15 +1,11 @@
 //! The metrics of eq. 12 to 16 on cases worked out by hand, and the protocol around them.
 
-use std::collections::BTreeMap;
-
 use glam::{DQuat, DVec3};
-use keydance::data::DanceClip;
-use keydance::evaluation::metrics::{foot_skate, means};
-use keydance::evaluation::{
-    Evaluation, EvaluationError, LengthScores, Protocol, WindowScores, window_scores,
-};
+use keydance::evaluation::equations::{Equations, WindowScores, foot_skate, means, window_scores};
+use keydance::evaluation::{EvaluationError, ScoreRow, Scores};
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::DanceClip;
 use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{BODY_VELOCITIES, CONTACTS, FEATURES, FRAME, ROOT_POSITION};
 use keydance::motion::{
@@ -39,7 +35,7 @@ fn lrp_is_the_norm_over_all_69_numbers_averaged_over_frames() {
     predicted.frames[[0, 0]] = 3.0;
     predicted.frames[[0, 68]] = 4.0;
     predicted.frames[[2, 30]] = -7.0;
-    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    let scores = window_scores(recorded.view(), predicted.frames.view()).unwrap();
     assert_eq!(scores.body_position, (5.0 + 7.0) / 4.0);
     assert_eq!(scores.root, 0.0);
 }
@@ -53,7 +49,7 @@ fn root_deviation_is_the_mean_distance_in_space() {
         .frames
         .slice_mut(s![1, ROOT_POSITION])
         .assign(&offset);
-    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    let scores = window_scores(recorded.view(), predicted.frames.view()).unwrap();
     assert_eq!(scores.root, 7.0 / 2.0);
     assert_eq!(scores.body_position, 0.0);
 }
@@ -73,7 +69,7 @@ fn velocity_factors_come_from_predicted_positions_and_start_at_the_true_keyframe
         .frames
         .slice_mut(s![.., BODY_VELOCITIES])
         .fill(100.0);
-    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    let scores = window_scores(recorded.view(), predicted.frames.view()).unwrap();
     assert!((scores.velocity_factor - 2.4 / (2.0 * 5.0)).abs() < 1e-12);
 }
 
@@ -90,9 +86,9 @@ fn foot_skate_counts_where_the_recorded_feet_stand_whatever_the_model_says_of_it
         predicted.frames[[step, ankle]] = place;
     }
     predicted.frames.slice_mut(s![.., CONTACTS]).fill(0.0);
-    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    let scores = window_scores(recorded.view(), predicted.frames.view()).unwrap();
     assert_eq!((scores.foot_travel, scores.foot_contacts), (6.0, 2));
-    let lifted = window_scores(still(3).view(), &predicted).unwrap();
+    let lifted = window_scores(still(3).view(), predicted.frames.view()).unwrap();
     assert_eq!(foot_skate(&[scores, lifted]), Some(3.0));
     assert_eq!(foot_skate(&[lifted]), None);
 }
@@ -105,7 +101,7 @@ fn the_root_moves_the_trunk_factor() {
     for step in 0..3 {
         predicted.frames[[step, ROOT_POSITION.start]] = 8.0 * (step + 1) as f64;
     }
-    let scores = window_scores(recorded.view(), &predicted).unwrap();
+    let scores = window_scores(recorded.view(), predicted.frames.view()).unwrap();
     assert!((scores.velocity_factor - 8.0 / 9.0 / 5.0).abs() < 1e-12);
 }
 
@@ -135,7 +131,7 @@ fn predictions_that_do_not_fit_are_errors_that_name_both_shapes() {
     let short = Transition {
         frames: Array2::zeros((2, FRAME)),
     };
-    let error = window_scores(recorded.view(), &short).unwrap_err();
+    let error = window_scores(recorded.view(), short.frames.view()).unwrap_err();
     let text = error.to_string();
     assert!(
         text.contains("[2, 149]") && text.contains("[3, 149]"),
@@ -145,7 +141,7 @@ fn predictions_that_do_not_fit_are_errors_that_name_both_shapes() {
     let mut wild = perfect(&recorded);
     wild.frames[[1, 4]] = f64::NAN;
     assert!(matches!(
-        window_scores(recorded.view(), &wild),
+        window_scores(recorded.view(), wild.frames.view()),
         Err(ModelError::NotFinite { .. })
     ));
 }
@@ -154,7 +150,7 @@ proptest! {
     #[test]
     fn a_perfect_prediction_has_no_error(clip in moving_clip(12)) {
         let window = keydance::models::transition::window_features(&clip.features, 0, 11);
-        let scores = window_scores(window.view(), &perfect(&window)).unwrap();
+        let scores = window_scores(window.view(), perfect(&window).frames.view()).unwrap();
         prop_assert_eq!(scores.body_position, 0.0);
         prop_assert_eq!(scores.root, 0.0);
         prop_assert!(scores.velocity_factor < 1e-12);
@@ -169,7 +165,7 @@ proptest! {
                 row[ROOT_POSITION.start + axis] += by;
             }
         }
-        let scores = window_scores(window.view(), &predicted).unwrap();
+        let scores = window_scores(window.view(), predicted.frames.view()).unwrap();
         let norm = shift.iter().map(|by| by * by).sum::<f64>().sqrt();
         prop_assert!((scores.root - norm).abs() < 1e-9);
         prop_assert_eq!(scores.body_position, 0.0);
@@ -229,12 +225,17 @@ fn clip(name: &str, frames: usize, turn: f64, walk: f64, wave: f64) -> DanceClip
 
 /// Answers every request from the clips themselves, found again by the root trajectory, which the
 /// test makes unique.
-struct Oracle<'a> {
-    clips: &'a [DanceClip],
+struct Oracle {
+    clips: Vec<DanceClip>,
     root_shift: f64,
 }
 
-impl TransitionModel for Oracle<'_> {
+fn oracle(clips: &[DanceClip], root_shift: f64) -> Oracle {
+    let clips = clips.to_vec();
+    Oracle { clips, root_shift }
+}
+
+impl TransitionModel for Oracle {
     fn name(&self) -> &str {
         "oracle"
     }
@@ -275,29 +276,24 @@ fn clips() -> Vec<DanceClip> {
 #[test]
 fn a_model_that_knows_the_answer_scores_0_1_1_and_a_shifted_one_misses_the_root() {
     let clips = clips();
-    let protocol = Protocol {
+    let protocol = Equations {
         lengths: vec![10, 30],
         chunk: 3,
-        ..Protocol::default()
+        ..Equations::default()
     };
     for (root_shift, art) in [(0.0, 1.0), (6.9, 1.0), (7.0, 0.0), (-8.0, 0.0)] {
-        let oracle = Oracle {
-            clips: &clips,
-            root_shift,
-        };
-        let outcome = protocol.evaluate(&oracle, &clips).unwrap();
-        let scores = outcome.evaluation;
-        assert_eq!(scores.lrp.average(), 0.0);
-        assert_eq!(scores.art.average(), art, "shifted by {root_shift}");
-        assert_eq!(scores.avf.average(), 1.0);
+        let oracle = oracle(&clips, root_shift);
+        let evaluation = protocol.evaluate_clips(&oracle, &clips).unwrap();
+        let scores = evaluation.scores;
+        let average = |metric: &str| scores.row(metric).unwrap().average();
+        assert_eq!(average("lrp"), 0.0);
+        assert_eq!(average("art"), art, "shifted by {root_shift}");
+        assert_eq!(average("avf"), 1.0);
         // (61 - 11) / 2 + 1 and (40 - 11) / 2 + 1 windows of 11 frames; (61 - 31) / 4 + 1 and
         // (40 - 31) / 4 + 1 of 31.
-        assert_eq!(scores.windows, BTreeMap::from([(10, 26 + 15), (30, 8 + 3)]));
-        let warnings: Vec<String> = outcome
-            .skipped
-            .iter()
-            .map(|clip| clip.to_string())
-            .collect();
+        let counts = [("10".into(), 26 + 15), ("30".into(), 8 + 3)];
+        assert_eq!(scores.windows(), counts);
+        let warnings = evaluation.warnings;
         assert_eq!(warnings.len(), 2);
         assert!(warnings[0].contains("brief has 8 frames") && warnings[0].contains("N = 10"));
     }
@@ -306,10 +302,10 @@ fn a_model_that_knows_the_answer_scores_0_1_1_and_a_shifted_one_misses_the_root(
 #[test]
 fn scores_are_the_same_bits_on_any_number_of_threads() {
     let clips = clips();
-    let protocol = Protocol {
+    let protocol = Equations {
         lengths: vec![10],
         chunk: 4,
-        ..Protocol::default()
+        ..Equations::default()
     };
     let scores = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -317,8 +313,8 @@ fn scores_are_the_same_bits_on_any_number_of_threads() {
             .build()
             .unwrap();
         let model = Interpolation::default();
-        let outcome = pool.install(|| protocol.evaluate(&model, &clips)).unwrap();
-        serde_json::to_string(&outcome.evaluation).unwrap()
+        let evaluation = pool.install(|| protocol.evaluate_clips(&model, &clips));
+        serde_json::to_string(&evaluation.unwrap().scores).unwrap()
     };
     let one = scores(1);
     assert!(
@@ -333,20 +329,17 @@ fn scores_are_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn a_length_without_windows_is_an_error_that_names_the_longest_clip() {
     let clips = clips();
-    let oracle = Oracle {
-        clips: &clips,
-        root_shift: 0.0,
+    let error = Equations::default().evaluate_clips(&oracle(&clips, 0.0), &clips);
+    let EvaluationError::NoWindows {
+        length,
+        needed,
+        clips,
+        longest,
+    } = error.unwrap_err()
+    else {
+        panic!("another error");
     };
-    let error = Protocol::default().evaluate(&oracle, &clips).unwrap_err();
-    assert_eq!(
-        error,
-        EvaluationError::NoWindows {
-            length: 100,
-            needed: 101,
-            clips: 3,
-            longest: 61
-        }
-    );
+    assert_eq!((length, needed, clips, longest), (100, 101, 3, 61));
 }
 
 /// A model that does not do what was asked.
@@ -363,24 +356,21 @@ impl TransitionModel for Wrong {
 }
 
 #[test]
-fn a_protocol_without_lengths_and_a_model_that_fails_are_errors_that_say_where() {
+fn a_length_of_0_and_a_model_that_fails_are_errors_that_say_where() {
     let clips = clips();
-    let lengths = |lengths: &[usize]| Protocol {
+    let lengths = |lengths: &[usize]| Equations {
         lengths: lengths.to_vec(),
-        ..Protocol::default()
+        ..Equations::default()
     };
     let fails = Wrong(|_| {
         Err(ModelError::NotFinite {
             what: "a weight".into(),
         })
     });
-    let text = |protocol: Protocol, model: &Wrong, clips: &[DanceClip]| {
-        format!(
-            "{:#}",
-            anyhow::Error::from(protocol.evaluate(model, clips).unwrap_err())
-        )
+    let text = |protocol: Equations, model: &Wrong, clips: &[DanceClip]| {
+        let error = protocol.evaluate_clips(model, clips).unwrap_err();
+        format!("{:#}", anyhow::Error::from(error))
     };
-    assert!(text(lengths(&[]), &fails, &clips).contains("no transition lengths"));
     assert!(text(lengths(&[0]), &fails, &clips).contains("0 frames"));
     let found = text(lengths(&[5]), &fails, &clips);
     let of_a_clip = clips.iter().any(|clip| found.contains(&clip.name));
@@ -388,12 +378,14 @@ fn a_protocol_without_lengths_and_a_model_that_fails_are_errors_that_say_where()
         found.contains("wrong") && of_a_clip && found.contains("a weight"),
         "{found}"
     );
-    let found = text(lengths(&[5]), &Wrong(|_| Ok(Vec::new())), &clips);
+    let silent = Wrong(|_| Ok(Vec::new()));
+    let found = text(lengths(&[5]), &silent, &clips);
     assert!(found.contains("wrong") && found.contains('0'), "{found}");
     let mut short = clips.clone();
     short[0].clip.poses.truncate(7);
     // A model that works: whichever chunk fails first, it is one of this clip's.
-    let error = lengths(&[5]).evaluate(&Interpolation::default(), &short);
+    let interpolation = Interpolation::default();
+    let error = lengths(&[5]).evaluate_clips(&interpolation, &short);
     let found = format!("{:#}", anyhow::Error::from(error.unwrap_err()));
     assert!(
         found.contains(&short[0].name) && found.contains('7'),
@@ -403,34 +395,26 @@ fn a_protocol_without_lengths_and_a_model_that_fails_are_errors_that_say_where()
 
 #[test]
 fn the_json_has_lengths_as_keys_and_avg_and_reads_back() {
-    let scores = |values: [f64; 2]| LengthScores::new([10, 150].into_iter().zip(values).collect());
-    let evaluation = Evaluation {
-        lrp: scores([13.5, 124.5]),
-        avf: scores([0.5, 0.25]),
-        art: scores([1.0, 1.0]),
-        foot_skate: None,
-        windows: BTreeMap::from([(10, 7), (150, 3)]),
-    };
-    let json = serde_json::to_string(&evaluation).unwrap();
+    let row = |values: [f64; 2]| ScoreRow::new([10, 150].into_iter().zip(values)).with_average();
+    let rows = [
+        ("lrp", row([13.5, 124.5])),
+        ("avf", row([0.5, 0.25])),
+        ("art", row([1.0, 1.0])),
+    ];
+    let windows = [(10, 7), (150, 3)];
+    let scores = Scores::new(rows.clone(), windows);
+    let json = serde_json::to_string(&scores).unwrap();
     assert_eq!(
         json,
         r#"{"lrp":{"10":13.5,"150":124.5,"avg":69.0},"avf":{"10":0.5,"150":0.25,"avg":0.375},"art":{"10":1.0,"150":1.0,"avg":1.0},"windows":{"10":7,"150":3}}"#
     );
-    assert_eq!(
-        serde_json::from_str::<Evaluation>(&json).unwrap(),
-        evaluation
-    );
+    assert_eq!(serde_json::from_str::<Scores>(&json).unwrap(), scores);
     // Scores of a version that did not measure foot skate are read as above; those of this one keep
     // it.
-    let with_skate = Evaluation {
-        foot_skate: Some(scores([0.5, 1.5])),
-        ..evaluation
-    };
+    let skate = [("foot_skate", row([0.5, 1.5]))];
+    let with_skate = Scores::new(rows.into_iter().chain(skate), windows);
     let text = serde_json::to_string(&with_skate).unwrap();
-    assert_eq!(
-        serde_json::from_str::<Evaluation>(&text).unwrap(),
-        with_skate
-    );
-    let error = serde_json::from_str::<Evaluation>(&json.replace("\"10\":13.5", "\"ten\":1.0"));
-    assert!(error.unwrap_err().to_string().contains("\"ten\""));
+    assert_eq!(serde_json::from_str::<Scores>(&text).unwrap(), with_skate);
+    let error = serde_json::from_str::<Scores>(&json.replace("\"10\":13.5", "\"10\":\"x\""));
+    assert!(error.is_err());
 }

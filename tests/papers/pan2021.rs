@@ -4,12 +4,11 @@
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
-use keydance::models::ModelConfig;
 use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
+use keydance::models::settings::GradientCheckOptions;
+use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
-use keydance::models::transition::gradient_check::{
-    GradientCase, GradientCheckConfig, check_model, generated_windows,
-};
+use keydance::models::transition::gradient_check::{GradientCase, check_model, generated_windows};
 use keydance::models::transition::{Batch, Feed, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
@@ -330,12 +329,14 @@ fn gradients_are_right(config: &Pan2021Config) {
             feed,
             dropout,
         };
-        let settings = GradientCheckConfig {
+        let options = GradientCheckOptions {
+            frames: None,
+            full_size: false,
             windows: 2,
             per_parameter: 2,
             seed: 2,
         };
-        let report = check_model(&model, case, settings).unwrap().unwrap();
+        let report = check_model(&model, case, &options).unwrap().unwrap();
         let worst = report.parameters.iter().filter_map(|p| p.worst.as_ref());
         let worst = worst.max_by(|a, b| a.error.total_cmp(&b.error));
         assert!(report.error() < 1e-5, "{case:?}: {worst:?}");

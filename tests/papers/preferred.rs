@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Tape, Workspace};
+use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig};
-use keydance::evaluation::window_request;
+use keydance::evaluation::equations::window_request;
 use keydance::models::pan2021::Pan2021Config;
+use keydance::models::transition::DanceClip;
 use keydance::models::transition::gradient_check::generated_windows;
 use keydance::models::transition::{
     Batch, Feed, Network, SingleFrame, TrainedModel, Transition, TransitionModel, TransitionRequest,
@@ -168,7 +169,8 @@ fn in_the_keyframes_frame_a_dance_elsewhere_on_the_floor_or_in_another_direction
     let clips = clips();
     let (clip, start, length) = (&clips[0], 30, 20);
     let window = window_features(&clip.features, start, length);
-    let request = window_request(&clip.clip, start, window.view()).unwrap();
+    let request =
+        TransitionRequest::of(&window_request(&clip.clip, start, window.view()).unwrap()).unwrap();
     let shift = [250.0, 0.0, -130.0];
     let raised = [0.0, 40.0, 0.0];
     let angle = 2.0;

@@ -1,16 +1,19 @@
 //! A training small enough for tests: a one-layer recurrence on smooth made-up features.
 
 use keydance::autograd::{AutogradError, BlockId, Parameters, Real, Tape};
-use keydance::data::{DanceClip, Dataset};
+use keydance::data::choreography::{ChoreographyConfig, generate};
+use keydance::data::{Dataset, Recording};
 use keydance::experiment::ExperimentConfig;
-use keydance::models::LossTerms;
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::settings::InitialRng;
+use keydance::models::transition::{
+    Batch, DanceClip, Feed, Network, Schedule, TransitionSettings, TransitionTask,
+};
+use keydance::models::{LossTerms, Streams};
 use keydance::motion::features::{FEATURES, FRAME};
-use keydance::motion::{Clip, Skeleton};
 use keydance::nn::Initialiser;
 use keydance::optim::RateSchedule;
 use keydance::training::{Trainer, TrainingError};
-use ndarray::{Array2, Array3, Axis, s};
+use ndarray::{Array3, Axis, s};
 
 const HIDDEN: usize = 8;
 
@@ -83,6 +86,7 @@ impl<T: Real> Network<T> for Recurrence {
             total,
             critics: None,
             terms: vec![("reconstruction", total)],
+            buffers: Vec::new(),
         })
     }
 
@@ -98,50 +102,59 @@ impl<T: Real> Network<T> for Recurrence {
 /// The network's parameters with this many hidden units.
 pub fn parameters(hidden: usize) -> Parameters<f32> {
     let mut parameters = Parameters::new();
-    let rng = keydance::models::Streams::new(9).initialisation();
+    let rng = Streams::new(9).initialisation();
     Recurrence::new(&mut Initialiser::new(&mut parameters, rng), hidden);
     parameters
 }
 
-/// Three clips of unlike lengths.
+/// Three clips of unlike lengths to train on, one to test on.
 pub fn dataset() -> Dataset {
-    let clip = |k: usize, frames: usize| DanceClip {
-        name: format!("{k}.bvh"),
-        features: Array2::from_shape_fn((frames, FEATURES), |(t, i)| {
-            let speed = 0.05 + 0.01 * (i % 7) as f64;
-            ((t as f64 + 3.0 * k as f64) * speed + i as f64).sin() * (1.0 + i as f64)
-        }),
-        clip: Clip {
-            name: format!("{k}.bvh"),
-            skeleton: Skeleton { joints: Vec::new() },
-            frame_time: 1.0 / 30.0,
-            poses: Vec::new(),
-        },
+    let choreography = ChoreographyConfig {
+        clips: 4,
+        frames_per_clip: 80,
+        seed: 7,
     };
+    let clips = generate(&choreography).unwrap();
+    let mut recordings: Vec<Recording> = clips
+        .into_iter()
+        .zip([60, 35, 80, 40])
+        .map(|(generated, frames)| {
+            let mut clip = generated.clip;
+            clip.poses.truncate(frames);
+            Recording { clip }
+        })
+        .collect();
+    let test = recordings.split_off(3);
     Dataset {
-        train: vec![clip(0, 60), clip(1, 35), clip(2, 80)],
+        train: recordings,
         validation: Vec::new(),
-        test: vec![clip(3, 40)],
+        test,
         digest: "synthetic".into(),
     }
+}
+
+/// The part of a config that is a transition model's own.
+pub fn settings(config: &mut ExperimentConfig) -> &mut TransitionSettings {
+    TransitionSettings::of_mut(config).unwrap()
 }
 
 /// Four epochs of transitions of 3 to 6 frames in batches of 13, some 60 steps.
 pub fn config() -> ExperimentConfig {
     let mut config = ExperimentConfig::default();
-    config.schedule.min_len = 3;
-    config.schedule.max_len = 6;
-    config.schedule.min_len_step = 1;
-    config.schedule.min_len_every = 2;
-    config.schedule.batch_size = 13;
-    config.schedule.fraction = 0.6;
+    let own = settings(&mut config);
+    own.schedule.min_len = 3;
+    own.schedule.max_len = 6;
+    own.schedule.min_len_step = 1;
+    own.schedule.min_len_every = 2;
+    own.schedule.batch_size = 13;
+    own.schedule.fraction = 0.6;
+    own.scheduled_sampling.decay = 0.7;
     config.optimiser.learning_rate = 0.01;
     config.optimiser.rate_schedule = Some(RateSchedule {
         warmup_steps: 3,
         final_share: 0.2,
         ..RateSchedule::default()
     });
-    config.scheduled_sampling.decay = 0.7;
     config.checkpoint.every_steps = 10;
     config
 }
@@ -159,7 +172,29 @@ pub fn try_trainer(
     data: &Dataset,
     threads: usize,
 ) -> Result<Trainer<'_>, TrainingError> {
-    Trainer::with_network(config, data, threads, |init, _| {
-        Ok(Box::new(Recurrence::new(init, HIDDEN)))
+    trainer_of_network(config, data, threads, |init| {
+        Box::new(Recurrence::new(init, HIDDEN))
     })
+}
+
+/// The training of a network that no config describes.
+pub fn trainer_of_network<'d>(
+    config: ExperimentConfig,
+    data: &'d Dataset,
+    threads: usize,
+    build: impl FnOnce(&mut Initialiser<'_, f32, InitialRng>) -> Box<dyn Network<f32>>,
+) -> Result<Trainer<'d>, TrainingError> {
+    let own = TransitionSettings::of(&config).unwrap().clone();
+    Trainer::with_task(config, data, threads, |setting, init| {
+        let clips = DanceClip::measure_all(&data.train, &setting.data.features()).unwrap();
+        let task = TransitionTask::new(&own, setting, clips, |_| Ok(build(init)))?;
+        Ok(Box::new(task))
+    })
+}
+
+/// The curriculum of a training on the data.
+pub fn schedule(config: &ExperimentConfig, data: &Dataset) -> Schedule {
+    let frames: Vec<usize> = data.train.iter().map(Recording::frames).collect();
+    let own = TransitionSettings::of(config).unwrap();
+    Schedule::new(&frames, &own.schedule, Streams::new(config.seed))
 }

@@ -8,11 +8,11 @@ use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataConfig, Dataset, Split};
 use keydance::experiment::ExperimentConfig;
 use keydance::models::LossTerms;
-use keydance::models::transition::Standardisation;
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::transition::{Batch, Feed, Network, Standardisation};
 use keydance::motion::features::{FRAME, ROOT_POSITION, ROOT_VELOCITY};
-use keydance::training::Trainer;
 use ndarray::{Array1, Array2, Array3, ArrayView2, Axis, s};
+
+use crate::small_training::{settings, trainer_of_network};
 
 /// A network with one weight that keeps what it was shown.
 struct Witness {
@@ -39,6 +39,7 @@ impl Network<f32> for Witness {
             total,
             critics: None,
             terms: vec![("weight", total)],
+            buffers: Vec::new(),
         })
     }
 
@@ -87,8 +88,8 @@ fn shown(
     single_frames: usize,
 ) -> (Vec<Batch<f32>>, f64) {
     let (batches, statistics) = shown_with(data, single_frames, |config| {
-        config.schedule.shards = shards;
-        config.augmentation.mirror = mirror;
+        settings(config).schedule.shards = shards;
+        settings(config).augmentation.mirror = mirror;
     });
     (batches, statistics.mean[ROOT_POSITION.start])
 }
@@ -100,19 +101,20 @@ fn shown_with(
     change: impl FnOnce(&mut ExperimentConfig),
 ) -> (Vec<Batch<f32>>, Standardisation) {
     let mut config = ExperimentConfig::default();
-    config.schedule.min_len = 6;
-    config.schedule.max_len = 6;
-    config.schedule.batch_size = 8;
-    config.schedule.shards = 1;
+    let own = settings(&mut config);
+    own.schedule.min_len = 6;
+    own.schedule.max_len = 6;
+    own.schedule.batch_size = 8;
+    own.schedule.shards = 1;
     change(&mut config);
     let shown = Arc::new(Mutex::new(Vec::new()));
     let witnessed = shown.clone();
-    let mut trainer = Trainer::with_network(config, data, 1, |init, _| {
-        Ok(Box::new(Witness {
+    let mut trainer = trainer_of_network(config, data, 1, |init| {
+        Box::new(Witness {
             weight: init.uniform("weight".into(), &[1], 1.0).1,
             single_frames,
             shown: witnessed,
-        }) as Box<dyn Network<f32>>)
+        })
     });
     let trainer = trainer.as_mut().unwrap_or_else(|error| panic!("{error}"));
     let stop_at_12 = &mut |report: &keydance::training::StepReport| match report.step {
@@ -120,7 +122,17 @@ fn shown_with(
         _ => ControlFlow::Continue(()),
     };
     trainer.run(None, stop_at_12).unwrap();
-    let statistics = trainer.standardisation().clone();
+    let statistics = trainer.task().statistics();
+    let of = |name: &str| -> Vec<f64> {
+        let found = statistics.iter().find(|(known, _)| *known == name);
+        found.unwrap().1.iter().copied().collect()
+    };
+    let statistics = Standardisation {
+        mean: of("feature_mean"),
+        std: of("feature_std"),
+        position_scale: of("position_scale")[0],
+        velocity_scale: of("velocity_scale")[0],
+    };
     let batches = shown.lock().unwrap().clone();
     (batches, statistics)
 }
@@ -199,7 +211,7 @@ fn windows_are_seen_at_every_tempo_and_the_statistics_are_those_of_the_recorded_
     let data = moved(|frame| 40.0 * frame as f64);
     let (plain, recorded) = shown_with(&data, 40, |_| {});
     let (batches, statistics) = shown_with(&data, 40, |config| {
-        config.augmentation.tempi = vec![0.5, 2.0];
+        settings(config).augmentation.tempi = vec![0.5, 2.0];
     });
     assert_eq!(statistics.mean, recorded.mean);
     assert_eq!(statistics.std, recorded.std);

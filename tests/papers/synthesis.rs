@@ -4,11 +4,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Mutex;
 
 use glam::{DQuat, DVec3};
+use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig};
-use keydance::evaluation::window_request;
+use keydance::evaluation::equations::window_request;
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;
+use keydance::models::transition::DanceClip;
 use keydance::models::transition::{DataRanges, window_features};
 use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
 use keydance::motion::features::{
@@ -39,7 +40,8 @@ fn dance(seed: u64, frames: usize) -> DanceClip {
 fn perfect_prediction() -> (DanceClip, TransitionRequest, Transition) {
     let clip = dance(5, 100);
     let window = window_features(&clip.features, 30, LENGTH);
-    let request = window_request(&clip.clip, 30, window.view()).unwrap();
+    let request =
+        TransitionRequest::of(&window_request(&clip.clip, 30, window.view()).unwrap()).unwrap();
     let frames = window.slice(s![1.., ..FRAME]).to_owned();
     (clip, request, Transition { frames })
 }

@@ -1,35 +1,44 @@
 //! Tables 2 to 4: the paper's values, ours and the difference.
 
-use keydance::evaluation::{
-    Evaluation, LengthScores, TableRow, markdown_tables, paper, terminal_tables,
-};
+use keydance::evaluation::equations::Equations;
+use keydance::evaluation::{PrintedTables, Protocol as _, ScoreRow, Scores, TableRow, Tables};
+use keydance::models::pan2021::PAPER;
+
+/// The transition lengths of the paper's tables, frames.
+const LENGTHS: [usize; 4] = [10, 50, 100, 150];
+
+fn printed() -> PrintedTables {
+    PrintedTables::parse(PAPER.printed, "paper.toml").unwrap()
+}
 
 fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> TableRow {
-    let scores = |values: &[f64]| {
-        LengthScores::new(
-            lengths
-                .iter()
-                .copied()
-                .zip(values.iter().copied())
-                .collect(),
-        )
-    };
-    let shares = vec![share; lengths.len()];
+    let row =
+        |values: &[f64]| ScoreRow::new(lengths.iter().zip(values.iter().copied())).with_average();
+    let shares = row(&vec![share; lengths.len()]);
+    let rows = [("lrp", row(lrp)), ("avf", shares.clone()), ("art", shares)];
+    let windows = lengths.iter().map(|&length| (length, 1000 / length));
     TableRow {
         name: name.into(),
         seed: None,
-        evaluation: Some(Evaluation {
-            lrp: scores(lrp),
-            avf: scores(&shares),
-            art: scores(&shares),
-            foot_skate: None,
-            windows: lengths
-                .iter()
-                .map(|&length| (length, 1000 / length))
-                .collect(),
-        }),
+        scores: Some(Scores::new(rows, windows)),
         schedule_note: note.into(),
     }
+}
+
+fn markdown(rows: &[TableRow], subject: &str) -> String {
+    in_tables(|tables| tables.markdown(rows, subject))
+}
+
+fn terminal(rows: &[TableRow]) -> String {
+    in_tables(|tables| tables.terminal(rows))
+}
+
+fn in_tables(show: impl FnOnce(Tables<'_>) -> String) -> String {
+    let (protocol, printed) = (Equations::default(), printed());
+    show(Tables {
+        metrics: protocol.metrics(),
+        printed: &printed,
+    })
 }
 
 /// The table's lines that follow the line of this model, as cells.
@@ -54,7 +63,7 @@ fn lines(table: &str, model: &str) -> Vec<Vec<String>> {
 }
 
 fn tables(rows: &[TableRow]) -> [String; 3] {
-    let text = markdown_tables(rows, "3 clips");
+    let text = markdown(rows, "3 clips");
     let parts: Vec<&str> = text.split("## Table ").skip(1).collect();
     assert_eq!(parts.len(), 3);
     [parts[0].into(), parts[1].into(), parts[2].into()]
@@ -62,9 +71,8 @@ fn tables(rows: &[TableRow]) -> [String; 3] {
 
 #[test]
 fn the_papers_averages_are_the_means_of_its_lengths() {
-    for row in paper::ROWS {
-        let tables = [Some(row.lrp), row.avf, row.art];
-        for values in tables.into_iter().flatten() {
+    for row in printed().rows {
+        for values in row.values.values() {
             let mean = values[..4].iter().sum::<f64>() / 4.0;
             assert!(
                 (mean - values[4]).abs() < 0.0101,
@@ -79,7 +87,7 @@ fn the_papers_averages_are_the_means_of_its_lengths() {
 fn a_model_of_the_paper_has_its_value_ours_and_the_difference() {
     let ours = row(
         "whole_model",
-        &paper::LENGTHS,
+        &LENGTHS,
         &[30.07, 50.06, 60.0, 80.0],
         0.8,
         "0.002 of the schedule",
@@ -140,7 +148,7 @@ fn a_model_of_the_paper_has_its_value_ours_and_the_difference() {
 fn interpolation_has_no_paper_value_for_avf_and_art() {
     let [lrp, avf, _] = tables(&[row(
         "interpolation",
-        &paper::LENGTHS,
+        &LENGTHS,
         &[1.0; 4],
         0.5,
         "not trained",
@@ -173,9 +181,9 @@ fn an_average_over_other_lengths_is_not_compared() {
 #[test]
 fn runs_of_one_model_and_models_of_our_own_are_all_there() {
     let rows = [
-        row("whole_model", &paper::LENGTHS, &[1.0; 4], 0.5, "short"),
-        row("whole_model", &paper::LENGTHS, &[2.0; 4], 0.5, "long"),
-        row("preferred", &paper::LENGTHS, &[3.0; 4], 0.5, "long"),
+        row("whole_model", &LENGTHS, &[1.0; 4], 0.5, "short"),
+        row("whole_model", &LENGTHS, &[2.0; 4], 0.5, "long"),
+        row("preferred", &LENGTHS, &[3.0; 4], 0.5, "long"),
     ];
     let [lrp, ..] = tables(&rows);
     let kinds: Vec<String> = lines(&lrp, "Whole model")
@@ -193,7 +201,7 @@ fn runs_of_one_model_and_models_of_our_own_are_all_there() {
 fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
     let seeded = |seed, lrp: [f64; 4]| TableRow {
         seed: Some(seed),
-        ..row("whole_model", &paper::LENGTHS, &lrp, 0.5, "short")
+        ..row("whole_model", &LENGTHS, &lrp, 0.5, "short")
     };
     let mut rows = vec![
         seeded(1, [30.0, 50.0, 60.0, 70.0]),
@@ -218,7 +226,7 @@ fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
     let note = "- Whole model (seed 1), Whole model (seed 2), Whole model (seed 3): short";
     assert!(lrp.contains(note), "{lrp}");
     // A seed that is still missing leaves its line, and the spread of the others.
-    rows[1].evaluation = None;
+    rows[1].scores = None;
     rows[1].schedule_note = "not trained yet".into();
     let [lrp, ..] = tables(&rows);
     let found = lines(&lrp, "Whole model");
@@ -229,14 +237,8 @@ fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
 #[test]
 fn a_model_that_is_not_trained_yet_keeps_its_row() {
     let absent = TableRow {
-        evaluation: None,
-        ..row(
-            "condition_fc",
-            &paper::LENGTHS,
-            &[0.0; 4],
-            0.5,
-            "not trained yet",
-        )
+        scores: None,
+        ..row("condition_fc", &LENGTHS, &[0.0; 4], 0.5, "not trained yet")
     };
     let [lrp, avf, _] = tables(&[absent]);
     for table in [&lrp, &avf] {
@@ -251,12 +253,12 @@ fn a_model_that_is_not_trained_yet_keeps_its_row() {
 fn the_terminal_shows_all_three_scores_and_the_windows() {
     let rows = [row(
         "interpolation",
-        &paper::LENGTHS,
+        &LENGTHS,
         &[22.85, 95.81, 116.83, 123.99],
         0.25,
         "",
     )];
-    let text = terminal_tables(&rows);
+    let text = terminal(&rows);
     let cells = |start: &str| -> Vec<String> {
         let line = text.lines().find(|line| line.starts_with(start)).unwrap();
         line[start.len()..]

@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 
 use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::experiment::ExperimentConfig;
+use keydance::models::LossTerms;
 use keydance::models::pan2021::{Controllers, Pan2021Config};
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::transition::{Batch, Feed, ModelConfig, Network, TransitionSettings};
 use keydance::models::weights::SavedWeights;
-use keydance::models::{LossTerms, ModelConfig};
 use keydance::run::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
 use keydance::run::state::decode;
-use keydance::run::{RunFolder, RunState};
+use keydance::run::{RunError, RunFolder, RunState};
 use keydance::training::{Outcome, StepReport, Trainer, TrainingError};
 use ndarray::Array3;
 use sha2::{Digest, Sha256};
 
-use crate::small_training::{self, config, dataset, trainer, trainer_of};
+use crate::small_training::{self, config, dataset, schedule, settings, trainer, trainer_of};
 
 /// Trains until `stop` steps are done, or to the end.
 fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: Option<u64>) -> Vec<StepReport> {
@@ -33,7 +33,7 @@ fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: Option<u64>) 
             }
         })
         .unwrap();
-    let stopped = stop.is_some_and(|stop| stop < trainer.schedule().steps());
+    let stopped = stop.is_some_and(|stop| stop < trainer.task().steps());
     assert_eq!(outcome == Outcome::Stopped, stopped);
     reports
 }
@@ -79,11 +79,11 @@ fn the_transformer_controllers_learn_at_their_own_rate_and_fully_connected_ones_
     let data = dataset();
     let moved = |controllers| {
         let mut config = config();
-        config.optimiser.transformer_learning_rate = Some(1e-20);
+        config.optimiser.rates.insert("transformers".into(), 1e-20);
         let ModelConfig::Pan2021(model) = ModelConfig::default().small() else {
             panic!("the default model is not the paper's");
         };
-        config.model = ModelConfig::Pan2021(Pan2021Config {
+        settings(&mut config).model = ModelConfig::Pan2021(Pan2021Config {
             controllers,
             ..model
         });
@@ -112,11 +112,16 @@ fn the_transformer_controllers_learn_at_their_own_rate_and_fully_connected_ones_
 fn both_feeds_are_drawn_and_the_loss_falls() {
     let data = dataset();
     let reports = train(&mut trainer(&data, 2), None, None);
-    let feeds = |beta: fn(f64) -> bool| reports.iter().filter(|r| beta(r.beta)).count();
+    let feeds = |beta: fn(f64) -> bool| {
+        reports
+            .iter()
+            .filter(|r| beta(r.column("beta").unwrap().as_f64().unwrap()))
+            .count()
+    };
     assert!(feeds(|beta| beta > 0.5) > 5 && feeds(|beta| beta < 0.5) > 5);
     let predicted = reports
         .iter()
-        .filter(|r| r.feed == keydance::models::transition::Feed::Predictions);
+        .filter(|r| r.column("feed").unwrap() == "predictions");
     assert!((5..reports.len() - 5).contains(&predicted.count()));
     let mean = |reports: &[StepReport]| {
         reports.iter().map(|r| r.total).sum::<f64>() / reports.len() as f64
@@ -130,16 +135,17 @@ fn a_resumed_training_ends_at_the_same_bits_wherever_it_stopped() {
     let data = dataset();
     let mut whole = trainer(&data, 2);
     let expected: Vec<_> = train(&mut whole, None, None).iter().map(numbers).collect();
-    let steps = whole.schedule().steps();
+    let steps = whole.task().steps();
+    let curriculum = schedule(whole.config(), &data);
     let epoch_starts: Vec<u64> = (0..steps)
-        .filter(|&step| step > 0 && whole.schedule().place(step).1 == 0)
+        .filter(|&step| step > 0 && curriculum.place(step).1 == 0)
         .collect();
     // At the end of the first epoch, where the shortest length grows (every 2 epochs), and inside
     // epochs.
     let grows = epoch_starts
         .iter()
         .copied()
-        .find(|&step| whole.schedule().place(step).0 == 2)
+        .find(|&step| curriculum.place(step).0 == 2)
         .unwrap();
     for stop in [1, epoch_starts[0], grows, grows + 1, steps - 1, steps] {
         let folder = tempfile::tempdir().unwrap();
@@ -199,7 +205,7 @@ fn killed_run(folder: &Path) -> PathBuf {
     path
 }
 
-fn finish(path: &Path) -> Result<(u64, Vec<String>, String), TrainingError> {
+fn finish(path: &Path) -> Result<(u64, Vec<String>, String), RunError> {
     let data = dataset();
     let mut trainer = trainer(&data, 2);
     let run = RunFolder::resume(path, trainer.config())?;
@@ -207,7 +213,7 @@ fn finish(path: &Path) -> Result<(u64, Vec<String>, String), TrainingError> {
     train(&mut trainer, Some(&run), None);
     assert_eq!(
         logged_steps(path),
-        (1..=trainer.schedule().steps()).collect::<Vec<_>>()
+        (1..=trainer.task().steps()).collect::<Vec<_>>()
     );
     Ok((resumed.steps, resumed.damaged, trainer.weights_digest()))
 }
@@ -418,6 +424,7 @@ impl Network<f32> for Cusp {
             total,
             terms: vec![("size", total)],
             critics: None,
+            buffers: Vec::new(),
         })
     }
 
@@ -434,8 +441,8 @@ impl Network<f32> for Cusp {
 fn a_gradient_that_is_not_finite_is_traced_to_its_operation_and_changes_no_weight() {
     let data = dataset();
     let folder = tempfile::tempdir().unwrap();
-    let mut trainer = Trainer::with_network(config(), &data, 2, |init, _| {
-        Ok(Box::new(Cusp(init.constant("w".into(), &[3], 0.0).1)))
+    let mut trainer = small_training::trainer_of_network(config(), &data, 2, |init| {
+        Box::new(Cusp(init.constant("w".into(), &[3], 0.0).1))
     })
     .unwrap();
     let before = trainer.weights_digest();
@@ -512,7 +519,9 @@ fn weights_of_another_model_are_refused_with_both_shapes() {
         *small.config()
     );
     let mut parameters = small_training::parameters(7);
-    let text = saved.load_into(&mut parameters).unwrap_err().to_string();
+    let statistics = trainer(&data, 1).task().statistics();
+    let text = saved.load_into(&mut parameters, &statistics);
+    let text = text.unwrap_err().to_string();
     assert!(
         text.contains("hidden.weight is [8, 154] in the file, [7, 154]"),
         "{text}"
@@ -520,7 +529,7 @@ fn weights_of_another_model_are_refused_with_both_shapes() {
 
     train(&mut small, None, Some(3));
     let mut parameters = small_training::parameters(8);
-    saved.load_into(&mut parameters).unwrap();
+    saved.load_into(&mut parameters, &statistics).unwrap();
     let digest = keydance::models::weights::digest(&parameters);
     assert_eq!(digest, trainer(&data, 1).weights_digest());
     assert_ne!(digest, small.weights_digest());
@@ -529,7 +538,9 @@ fn weights_of_another_model_are_refused_with_both_shapes() {
 #[test]
 fn mutated_weights_files_are_errors_or_whole_and_never_panic() {
     let data = dataset();
-    let content = trainer(&data, 1).weights_file().unwrap();
+    let trainer = trainer(&data, 1);
+    let statistics = trainer.task().statistics();
+    let content = trainer.weights_file().unwrap();
     let path = Path::new("w.safetensors");
     assert!(SavedWeights::parse(&content, path).is_ok());
     for at in (0..content.len()).step_by(97).chain(0..600) {
@@ -537,7 +548,7 @@ fn mutated_weights_files_are_errors_or_whole_and_never_panic() {
         changed[at] ^= 0x55;
         if let Ok(saved) = SavedWeights::parse(&changed, path) {
             let mut parameters = small_training::parameters(8);
-            let _ = saved.load_into(&mut parameters);
+            let _ = saved.load_into(&mut parameters, &statistics);
         }
         assert!(SavedWeights::parse(&content[..at], path).is_err());
     }
@@ -550,8 +561,8 @@ fn mutated_weights_files_are_errors_or_whole_and_never_panic() {
 fn clips_shorter_than_every_window_are_an_error_that_says_what_to_do() {
     let data = dataset();
     let mut config = config();
-    config.schedule.min_len = 1000;
-    config.schedule.max_len = 1000;
+    settings(&mut config).schedule.min_len = 1000;
+    settings(&mut config).schedule.max_len = 1000;
     let error = small_training::try_trainer(config, &data, 1).err().unwrap();
     let text = error.to_string();
     assert!(
@@ -604,8 +615,10 @@ fn the_budget_goes_over_every_config_of_the_paper_and_leaves_its_model() {
         let file = file.unwrap().path();
         let plain = ExperimentConfig::load(&file, &[]).unwrap();
         let config = ExperimentConfig::load_under(&file, Some(&budget), &[]).unwrap();
-        assert_eq!((&config.name, &config.model), (&plain.name, &plain.model));
-        assert_eq!(config.schedule.batch_size, 16, "{}", file.display());
+        let model = |config| &TransitionSettings::of(config).unwrap().model;
+        assert_eq!((&config.name, model(&config)), (&plain.name, model(&plain)));
+        let batch = TransitionSettings::of(&config).unwrap().schedule.batch_size;
+        assert_eq!(batch, 16, "{}", file.display());
     }
 }
 
@@ -629,9 +642,11 @@ fn the_check_on_unseen_dancers_trains_the_preferred_control_path_and_nothing_els
     let no_other_loss =
         ["rec", "con", "root", "key", "vfac"].map(|loss| format!("model.loss.{loss}=0"));
     let preferred = load("preferred/whole_model.toml", &no_other_loss);
+    let own = |config| TransitionSettings::of(config).unwrap();
+    let (ours, theirs) = (own(&check), own(&preferred));
     assert_eq!(
-        (check.model, check.augmentation),
-        (preferred.model, preferred.augmentation)
+        (&ours.model, &ours.augmentation),
+        (&theirs.model, &theirs.augmentation)
     );
     assert!(matches!(
         check.data.split,
@@ -664,11 +679,9 @@ fn a_finished_run_of_a_model_in_the_registry_loads_with_its_weights() {
     let none = run.trained_model(&config).err().unwrap().to_string();
     assert!(none.contains("keydance train"), "{none}");
     train(&mut trainer, Some(&run), None);
-    let loaded = run.trained_model(&config).unwrap();
+    let own = TransitionSettings::of(&config).unwrap();
+    let saved = run.saved_weights(&config).unwrap();
+    let loaded = own.load(&config.name, &saved).unwrap();
     let digest = keydance::models::weights::digest(loaded.parameters());
     assert_eq!(digest, trainer.weights_digest());
-    assert_eq!(
-        keydance::models::weights::digest(trainer.model().parameters()),
-        digest
-    );
 }

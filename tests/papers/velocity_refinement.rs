@@ -1,9 +1,10 @@
 //! Predicted bodies brought to the velocity factors that were asked for.
 
 use glam::{DQuat, DVec3};
+use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::data::{DanceClip, DataConfig};
-use keydance::evaluation::window_request;
+use keydance::evaluation::equations::window_request;
+use keydance::models::transition::DanceClip;
 use keydance::models::transition::TransitionRequest;
 use keydance::models::transition::velocity_refinement;
 use keydance::models::transition::window_features;
@@ -29,7 +30,8 @@ fn clip() -> DanceClip {
 /// A transition of the clip, as recorded `[N + 1, 154]`, and what a model is asked for.
 fn transition(clip: &DanceClip, length: usize) -> (Array2<f64>, TransitionRequest) {
     let window = window_features(&clip.features, 30, length);
-    let request = window_request(&clip.clip, 30, window.view()).unwrap();
+    let request =
+        TransitionRequest::of(&window_request(&clip.clip, 30, window.view()).unwrap()).unwrap();
     (window, request)
 }
 

@@ -7,7 +7,6 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use self::metrics::{foot_skate, means};
 use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
 use super::scores::{ScoreRow, Scores};
 use super::{Better, Metric};
@@ -16,7 +15,7 @@ use crate::models::Generator;
 use crate::models::transition::{DanceClip, Window, window_features, windows};
 use crate::motion::FeatureConfig;
 
-pub use metrics::{WindowScores, window_scores};
+pub use metrics::{WindowScores, foot_skate, means, window_scores};
 pub use window_request::window_request;
 
 const METRICS: [Metric; 4] = [

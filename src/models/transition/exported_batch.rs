@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use ndarray::{Array3, Axis};
 use safetensors::tensor::{Dtype, TensorView};
 
+use super::DanceClip;
 use super::{Batch, Feed, PoseWindows, RootFrame, Standardisation, TrainedModel, windows};
 use crate::autograd::{AutogradError, Gradients, Tape, Workspace};
-use crate::data::DanceClip;
 use crate::models::ModelError;
 
 /// Which batch, and what is fed.

@@ -1,4 +1,4 @@
-//! Models of transitions as what the commands ask: a [`Generator`].
+//! Models of transitions as what the commands ask: each is a [`Generator`].
 
 use glam::DVec3;
 use ndarray::{Array1, Array2, Array3, s};
@@ -10,48 +10,22 @@ use crate::motion::features::{CONTACTS, FACING, FRAME};
 use crate::motion::placement::world_positions;
 use crate::motion::{Clip, FeatureConfig, JOINTS, PARTS, features};
 
-/// A model of transitions, asked for motion between two poses.
-pub struct Transitions {
-    model: Box<dyn TransitionModel>,
-}
-
-impl Transitions {
-    pub fn new(model: impl TransitionModel + 'static) -> Self {
-        Self::boxed(Box::new(model))
-    }
-
-    pub fn boxed(model: Box<dyn TransitionModel>) -> Self {
-        Self { model }
-    }
-
-    fn transitions(&self, requests: &[Request]) -> Result<Vec<Transition>, ModelError> {
-        let needs = self.needs();
-        let requests: Vec<TransitionRequest> = requests
-            .iter()
-            .map(|request| {
-                request.check(self.name(), &needs)?;
-                TransitionRequest::of(request)
-            })
-            .collect::<Result<_, _>>()?;
-        self.model.transitions(&requests)
-    }
-}
-
-impl Generator for Transitions {
+/// A model of transitions is asked for motion between two poses.
+impl<M: TransitionModel> Generator for M {
     fn name(&self) -> &str {
-        self.model.name()
+        TransitionModel::name(self)
     }
 
     fn needs(&self) -> Needs {
         Needs {
             poses: NeededPoses::Ends,
-            conditions: self.model.conditions(),
+            conditions: self.conditions(),
             heeds: &[],
         }
     }
 
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
-        let transitions = self.transitions(requests)?;
+        let transitions = answers(self, requests)?;
         let motions = requests.iter().zip(transitions);
         motions
             .map(|(request, transition)| motion(request, transition))
@@ -59,9 +33,24 @@ impl Generator for Transitions {
     }
 
     fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
-        let transitions = self.transitions(requests)?;
+        let transitions = answers(self, requests)?;
         Ok(transitions.into_iter().map(|it| it.frames).collect())
     }
+}
+
+fn answers<M: TransitionModel>(
+    model: &M,
+    requests: &[Request],
+) -> Result<Vec<Transition>, ModelError> {
+    let needs = model.needs();
+    let requests: Vec<TransitionRequest> = requests
+        .iter()
+        .map(|request| {
+            request.check(TransitionModel::name(model), &needs)?;
+            TransitionRequest::of(request)
+        })
+        .collect::<Result<_, _>>()?;
+    model.transitions(&requests)
 }
 
 /// The frames of a transition in the world, after the keyframe that they start from.

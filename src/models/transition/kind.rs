@@ -4,16 +4,16 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::settings::TransitionSettings;
-use super::{Network, RootFrame, Standardisation, TransitionModel};
+use super::{Network, RootFrame, Standardisation};
 use crate::autograd::Real;
 use crate::data::DataConfig;
-use crate::models::ModelError;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::baselines::linear_positions::LinearPositions;
 use crate::models::baselines::zero_velocity::ZeroVelocity;
 use crate::models::harvey2020::{Harvey2020, Harvey2020Config};
 use crate::models::pan2021::{Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
 use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
+use crate::models::{Generator, ModelError};
 use crate::nn::Initialiser;
 
 /// A kind of transition model: a line of the registry.
@@ -206,7 +206,7 @@ impl ModelConfig {
     }
 
     /// The model, where it needs no training.
-    pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn TransitionModel>> {
+    pub fn untrained(&self, contact_threshold: f64) -> Option<Box<dyn Generator>> {
         match self {
             Self::Interpolation(_) => Some(Box::new(Interpolation { contact_threshold })),
             Self::LinearPositions(_) => Some(Box::new(LinearPositions { contact_threshold })),

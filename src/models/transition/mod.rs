@@ -2,7 +2,7 @@
 //!
 //! - the data: [`DanceClip`]s, their windows, statistics and frames of reference, mirror images and tempi;
 //! - [`Network`]: losses and predictions on a tape; [`TrainedModel`]: one with its weights;
-//! - [`TransitionModel`]: what fills a [`TransitionRequest`]; [`Transitions`]: one as a [`crate::models::Generator`];
+//! - [`TransitionModel`]: what fills a [`TransitionRequest`], as any [`Generator`](crate::models::Generator) may be asked;
 //! - [`TransitionTask`]: the curriculum, with scheduled sampling and single frames;
 //! - [`TransitionSettings`], [`ModelConfig`], [`Kind`]: their part of a config.
 
@@ -34,7 +34,6 @@ pub mod window;
 mod windows;
 
 pub use dance_clip::DanceClip;
-pub use generator::Transitions;
 pub use kind::{Kind, ModelConfig, NoSettings};
 pub use network::{Batch, Feed, Network, SingleFrame};
 pub use pose_windows::PoseWindows;

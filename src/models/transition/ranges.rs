@@ -4,8 +4,10 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use super::Standardisation;
+use crate::experiment::ExperimentConfig;
 use crate::motion::PARTS;
 use crate::motion::features::{ROOT_POSITION, ROOT_VELOCITY, VELOCITY_FACTORS};
+use crate::run::{RunError, RunFolder};
 
 /// Share of the frames that lie below a bound.
 const SHARE: f64 = 0.999;
@@ -25,6 +27,23 @@ pub struct DataRanges {
 }
 
 impl DataRanges {
+    /// Bounds of what a run's model was trained on; none where it needs no training.
+    ///
+    /// # Errors
+    /// The run's manifest or weights cannot be read.
+    pub fn of_run(run: &RunFolder, config: &ExperimentConfig) -> Result<Option<Self>, RunError> {
+        if config.model.untrained(&config.data).is_some() {
+            return Ok(None);
+        }
+        let saved = run.manifest()?.and_then(|it| it.fact("data_ranges"));
+        if saved.is_some() {
+            return Ok(saved);
+        }
+        let weights = run.saved_weights(config)?;
+        let statistics = Standardisation::saved(&weights)?;
+        Ok(Some(Self::from_statistics(&statistics)))
+    }
+
     /// Bounds over the frames of these clips, each `[frames, 154]`, not standardised. None for no frames.
     pub fn of<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Option<Self> {
         let column = |number: usize| -> Vec<f64> {

@@ -6,11 +6,12 @@ use toml::Table;
 use super::gradient_check::{self, GradientCheckError};
 use super::made_up::MadeUpTask;
 use super::task::TransitionTask;
-use super::{ModelConfig, Standardisation, TrainedModel, Transitions};
+use super::{ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::DataConfig;
 use crate::evaluation::{EvaluationOptions, Protocol, equations::Equations};
+use crate::experiment::ExperimentConfig;
 use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
@@ -126,6 +127,15 @@ impl ModelSettings for TransitionSettings {
         self.model.check(data)
     }
 
+    fn budget_note(&self) -> String {
+        let ScheduleConfig {
+            fraction,
+            batch_size,
+            ..
+        } = self.schedule;
+        format!("schedule.fraction {fraction}, batch size {batch_size}")
+    }
+
     fn rate_groups(&self) -> &'static [&'static str] {
         self.model.rate_groups()
     }
@@ -161,12 +171,11 @@ impl ModelSettings for TransitionSettings {
     }
 
     fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        Ok(Box::new(Transitions::new(self.load(name, saved)?)))
+        Ok(Box::new(self.load(name, saved)?))
     }
 
     fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>> {
-        let model = self.model.untrained(data.contact_threshold)?;
-        Some(Box::new(Transitions::boxed(model)))
+        self.model.untrained(data.contact_threshold)
     }
 
     fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol> {
@@ -193,6 +202,16 @@ impl ModelSettings for TransitionSettings {
 }
 
 impl TransitionSettings {
+    /// Those of an experiment, where its model is one of transitions.
+    pub fn of(config: &ExperimentConfig) -> Option<&Self> {
+        config.model.downcast_ref()
+    }
+
+    /// The same, to be changed.
+    pub fn of_mut(config: &mut ExperimentConfig) -> Option<&mut Self> {
+        config.model.downcast_mut()
+    }
+
     /// The network with saved weights.
     ///
     /// # Errors

@@ -12,7 +12,7 @@ use super::single_frames::{self, SingleFramePlan};
 use super::training_windows::TrainingWindows;
 use super::{
     Batch, BatchPlan, DanceClip, DataRanges, Feed, Network, Schedule, Standardisation,
-    TrainedModel, Transitions, Window,
+    TrainedModel, Window,
 };
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::models::settings::TaskSetting;
@@ -166,13 +166,13 @@ impl Task<f32> for TransitionTask {
     }
 
     fn generator(&self, name: &str, parameters: Parameters<f32>) -> Box<dyn Generator> {
-        Box::new(Transitions::new(TrainedModel::new(
+        Box::new(TrainedModel::new(
             name.into(),
             self.network.clone(),
             parameters,
             self.windows.standardisation.clone(),
             self.windows.root_frame,
-        )))
+        ))
     }
 
     fn summary(&self) -> Option<String> {

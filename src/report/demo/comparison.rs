@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::evaluation::{Evaluation, TableRow};
+use crate::evaluation::{Scores, TableRow};
 use crate::experiment::ExperimentConfig;
 use crate::report::{NO_TRAINING, schedule_note};
 use crate::run::Manifest;
@@ -14,10 +14,10 @@ const LONG: [usize; 2] = [100, 150];
 /// side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    pub interpolation: Evaluation,
+    pub interpolation: Scores,
     /// The best linear estimate from the keyframes, which a residual network begins with.
-    pub untrained: Evaluation,
-    pub model: Evaluation,
+    pub untrained: Scores,
+    pub model: Scores,
 }
 
 impl Comparison {
@@ -29,10 +29,10 @@ impl Comparison {
 
     /// The rows of the three in the tables, the model trained as config and manifest say.
     pub fn rows(&self, config: &ExperimentConfig, manifest: &Manifest) -> [TableRow; 3] {
-        let row = |name: &str, seed, evaluation: &Evaluation, schedule_note: &str| TableRow {
+        let row = |name: &str, seed, scores: &Scores, schedule_note: &str| TableRow {
             name: name.into(),
             seed,
-            evaluation: Some(evaluation.clone()),
+            scores: Some(scores.clone()),
             schedule_note: schedule_note.into(),
         };
         [
@@ -60,7 +60,12 @@ impl Comparison {
     /// Length, LRP (cm) of the model, of the model untrained and of interpolation.
     fn long(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         LONG.into_iter().map(|length| {
-            let lrp = |evaluation: &Evaluation| evaluation.lrp.at(length).unwrap_or(f64::NAN);
+            let lrp = |scores: &Scores| {
+                scores
+                    .row("lrp")
+                    .and_then(|row| row.at(length))
+                    .unwrap_or(f64::NAN)
+            };
             let scores = [&self.model, &self.untrained, &self.interpolation].map(lrp);
             (length, scores)
         })
@@ -84,26 +89,20 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::LengthScores;
+    use crate::evaluation::ScoreRow;
 
-    fn evaluation(lrp: [f64; 2]) -> Evaluation {
-        let scores = LengthScores::new(LONG.into_iter().zip(lrp).collect());
-        Evaluation {
-            lrp: scores.clone(),
-            avf: scores.clone(),
-            art: scores,
-            foot_skate: None,
-            windows: LONG.map(|length| (length, 1)).into(),
-        }
+    fn scores(lrp: [f64; 2]) -> Scores {
+        let row = ScoreRow::new(LONG.into_iter().zip(lrp));
+        Scores::new([("lrp", row)], LONG.map(|length| (length, 1)))
     }
 
     #[test]
     fn ahead_is_ahead_at_every_long_transition() {
         let ahead = |model: [f64; 2]| {
             Comparison {
-                interpolation: evaluation([70.0, 80.0]),
-                untrained: evaluation([75.0, 78.0]),
-                model: evaluation(model),
+                interpolation: scores([70.0, 80.0]),
+                untrained: scores([75.0, 78.0]),
+                model: scores(model),
             }
             .is_ahead()
         };

@@ -2,10 +2,12 @@
 
 mod comparison;
 mod losses;
+mod settings;
 mod showcase;
 
 pub use comparison::Comparison;
 pub use losses::Losses;
+pub use settings::{DemoSettings, DemoSettingsError};
 pub use showcase::{Showcase, ShowcaseFiles};
 
 use std::fs;
@@ -13,8 +15,7 @@ use std::path::{Path, PathBuf};
 
 use super::FigureError;
 use crate::data::{DataPart, Dataset, EmptyPart};
-use crate::evaluation::{EvaluatedData, EvaluationRecord, TableRow, markdown_tables};
-use crate::experiment::DemoSettings;
+use crate::evaluation::{EvaluatedData, EvaluationRecord, PrintedTables, TableRow, Tables};
 use crate::models::ModelError;
 use crate::motion::bvh::BvhError;
 use crate::motion::fit::RotationFitError;
@@ -101,14 +102,20 @@ pub fn write_scores(
     settings: &DemoSettings,
     dataset: &Dataset,
     comparison: &Comparison,
+    printed: &PrintedTables,
     rows: &[TableRow],
 ) -> Result<(), DemoError> {
-    let tables = markdown_tables(rows, &settings.caption(dataset));
-    replace_file(&folder.join(TABLES), tables.as_bytes())?;
+    let protocol = settings.experiment.protocol();
+    let tables = Tables {
+        metrics: protocol.metrics(),
+        printed,
+    };
+    let text = tables.markdown(rows, &settings.caption(dataset));
+    replace_file(&folder.join(TABLES), text.as_bytes())?;
     write_json(&folder.join(INTERPOLATION), &comparison.interpolation)?;
     write_json(&folder.join(UNTRAINED), &comparison.untrained)?;
     EvaluationRecord {
-        evaluation: comparison.model.clone(),
+        scores: comparison.model.clone(),
         data: EvaluatedData::of(dataset, DataPart::Test)?,
     }
     .write(folder)?;

@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use ndarray::{Array2, s};
 
 use super::DemoError;
-use crate::data::DanceClip;
-use crate::evaluation::window_request;
+use crate::evaluation::equations::window_request;
+use crate::models::transition::DanceClip;
 use crate::models::transition::window_features;
-use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
+use crate::models::transition::{Transition, TransitionRequest};
+use crate::models::{Generator, Request};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
@@ -31,7 +32,7 @@ pub struct Showcase<'d> {
     start: usize,
     /// `[N + 1, 154]`, not standardised.
     recorded: Array2<f64>,
-    request: TransitionRequest,
+    request: Request,
 }
 
 impl<'d> Showcase<'d> {
@@ -62,8 +63,8 @@ impl<'d> Showcase<'d> {
     /// A model fails, or a file cannot be written.
     pub fn write(
         &self,
-        interpolation: &dyn TransitionModel,
-        model: &dyn TransitionModel,
+        interpolation: &dyn Generator,
+        model: &dyn Generator,
         files: &ShowcaseFiles,
     ) -> Result<SynthesisedMotion, DemoError> {
         let predicted = self.predict(model)?;
@@ -83,18 +84,19 @@ impl<'d> Showcase<'d> {
         replace_file(&files.figure, self.figure(&motions)?.as_bytes())?;
         replace_file(&files.viewer, self.viewer(&motions)?.as_bytes())?;
         let name = files.bvh.display().to_string();
-        let motion =
-            transition_motion(&self.request, &predicted, &name, self.clip.clip.frame_time)?;
+        let request = TransitionRequest::of(&self.request)?;
+        let motion = transition_motion(&request, &predicted, &name, self.clip.clip.frame_time)?;
         let channels = channel_layout(&motion.clip, [Axis::Z, Axis::X, Axis::Y]);
         bvh::write(&files.bvh, &Bvh::from_clip(&motion.clip, channels)?)?;
         Ok(motion)
     }
 
-    fn predict(&self, model: &dyn TransitionModel) -> Result<Transition, DemoError> {
-        let mut transitions = model.transitions(std::slice::from_ref(&self.request))?;
-        transitions.pop().ok_or_else(|| DemoError::NoTransition {
+    fn predict(&self, model: &dyn Generator) -> Result<Transition, DemoError> {
+        let mut predicted = model.raw(std::slice::from_ref(&self.request))?;
+        let frames = predicted.pop().ok_or_else(|| DemoError::NoTransition {
             model: model.name().into(),
-        })
+        })?;
+        Ok(Transition { frames })
     }
 
     /// A prediction between the two keyframes as they were given, `[N + 1, 149]`.
@@ -135,10 +137,12 @@ impl<'d> Showcase<'d> {
             frame_time: self.clip.clip.frame_time,
             motions: motions.collect(),
             keyframes: keyframes.to_vec(),
-            asked: Some(Asked::new(
-                self.request.root_trajectory.view(),
-                self.request.velocity_factors.view(),
-            )),
+            asked: self
+                .request
+                .root
+                .as_ref()
+                .zip(self.request.velocity_factors.as_ref())
+                .map(|(root, factors)| Asked::new(root.view(), factors.view())),
         };
         viewer.html()
     }

@@ -6,7 +6,6 @@ pub mod pan2021;
 
 pub use error::FiguresError;
 pub use numbers::Numbers;
-pub use pan2021::lrp_figure;
 
 use std::path::Path;
 

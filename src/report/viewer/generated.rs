@@ -1,8 +1,9 @@
 //! The page of a generated sequence: beside interpolation and, where there is one, the recorded motion.
 
 use super::{MotionKind, RequestMotion, Viewer};
-use crate::models::ModelConfig;
+use crate::models::ModelKind as _;
 use crate::models::baselines::interpolation::Interpolation;
+use crate::models::transition::Kind;
 use crate::report::FigureError;
 use crate::run::Subject;
 use crate::synthesis::keyframes::Keyframes;
@@ -32,7 +33,7 @@ pub fn generated_page(
         contact_threshold: subject.config.data.contact_threshold,
     };
     let name = "Interpolation";
-    let interpolated = match matches!(subject.config.model, ModelConfig::Interpolation(_)) {
+    let interpolated = match subject.config.model.kind() == Kind::Interpolation.name() {
         false => Some(synthesise(&interpolation, request, options, name)?),
         true => None,
     };

@@ -3,7 +3,9 @@
 //! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as JSON. Nothing that a user wrote becomes
 //! markup: names are escaped in the page's title, and inside the JSON no `<` is left that could end its element.
 
+#[cfg(feature = "papers")]
 mod generated;
+#[cfg(feature = "papers")]
 mod of_request;
 mod page;
 mod positions;
@@ -19,7 +21,9 @@ use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
 use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
 
+#[cfg(feature = "papers")]
 pub use generated::{PageError, generated_page};
+#[cfg(feature = "papers")]
 pub use of_request::RequestMotion;
 
 /// Index of the joint that carries the head.

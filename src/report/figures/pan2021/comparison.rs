@@ -3,8 +3,7 @@
 use super::root::{root_distances, row_with_paths};
 use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
-use crate::evaluation::{WindowScores, window_scores};
-use crate::models::transition::Transition;
+use crate::evaluation::equations::{WindowScores, window_scores};
 use crate::motion::placement::world_positions;
 use crate::report::figures::{Figure, FiguresError, Numbers};
 use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
@@ -79,8 +78,7 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresErro
             .iter()
             .zip(&entry.generated)
             .map(|(window, generated)| {
-                let frames = generated.frames.slice(s![1.., ..]).to_owned();
-                window_scores(window.recorded.view(), &Transition { frames })
+                window_scores(window.recorded.view(), generated.frames.slice(s![1.., ..]))
             })
             .collect::<Result<_, _>>()
             .map_err(|source| FiguresError::Scores {

@@ -2,22 +2,20 @@
 
 mod comparison;
 mod lengths;
-mod lrp;
 mod root;
 mod stage;
 mod velocity;
 mod wording;
 
-pub use lrp::lrp_figure;
 pub use stage::{Choice, Stage, Window};
 
 use std::path::Path;
 
 use super::{Figure, FiguresError};
 use crate::data::Dataset;
-use crate::models::ModelConfig;
 use crate::models::baselines::interpolation::Interpolation;
-use crate::models::transition::TransitionModel;
+use crate::models::transition::Kind;
+use crate::models::{Generator, ModelKind as _};
 use crate::report::viewer::RequestMotion;
 use crate::report::{MotionKind, Viewer};
 use crate::run::Subject;
@@ -117,7 +115,7 @@ impl Cast {
         let window = stage.shown();
         let options = SynthesisOptions::default();
         let name = self.subject.config.name.as_str();
-        let mut models: Vec<(&str, MotionKind, &dyn TransitionModel)> = Vec::new();
+        let mut models: Vec<(&str, MotionKind, &dyn Generator)> = Vec::new();
         models.extend(
             self.others()
                 .into_iter()
@@ -147,14 +145,15 @@ impl Cast {
     }
 
     /// Name, whether it was trained, and model: interpolation unless it is among those given, then those to set beside.
-    fn others(&self) -> Vec<(&str, bool, &dyn TransitionModel)> {
+    fn others(&self) -> Vec<(&str, bool, &dyn Generator)> {
         let mut given = self.compared.iter().chain([&self.subject]);
-        let mut models: Vec<(&str, bool, &dyn TransitionModel)> = Vec::new();
-        if !given.any(|subject| matches!(subject.config.model, ModelConfig::Interpolation(_))) {
+        let mut models: Vec<(&str, bool, &dyn Generator)> = Vec::new();
+        if !given.any(|subject| subject.config.model.kind() == Kind::Interpolation.name()) {
             models.push(("Interpolation", false, &self.interpolation));
         }
         models.extend(self.compared.iter().map(|subject| {
-            let trained = subject.ranges.is_some();
+            let config = &subject.config;
+            let trained = config.model.untrained(&config.data).is_none();
             (
                 subject.config.name.as_str(),
                 trained,

@@ -4,8 +4,9 @@ use glam::DVec3;
 
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
-use crate::evaluation::{Protocol, Response, body_distance, root_response};
-use crate::models::transition::TransitionModel;
+use crate::evaluation::equations::Equations;
+use crate::models::Generator;
+use crate::models::transition::effect::{Response, body_distance, root_response};
 use crate::report::figures::{Figure, FiguresError, Numbers};
 use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
@@ -36,7 +37,7 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figur
         .iter()
         .map(|generated| mean(&root_distances(generated)))
         .collect();
-    let threshold = Protocol::default().root_threshold;
+    let threshold = Equations::default().root_threshold;
     let within = distances
         .iter()
         .filter(|distance| **distance < threshold)
@@ -75,7 +76,7 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figur
 /// Figure 6: the root lowered and raised on its way.
 pub fn figure_6(
     stage: &Stage,
-    model: &dyn TransitionModel,
+    model: &dyn Generator,
     plain: &[Generated],
 ) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
@@ -123,7 +124,7 @@ pub fn figure_6(
 /// Figure 7: quite other root trajectories between the same keyframes.
 pub fn figure_7(
     stage: &Stage,
-    model: &dyn TransitionModel,
+    model: &dyn Generator,
     plain: &[Generated],
 ) -> Result<Figure, FiguresError> {
     let paths: [(&str, &[f64]); 3] = [

@@ -4,9 +4,9 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
-use crate::data::DanceClip;
-use crate::models::transition::window_features;
-use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
+use crate::models::transition::DanceClip;
+use crate::models::transition::{check_frames, window_features};
+use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
@@ -133,7 +133,7 @@ impl<'d> Stage<'d> {
     /// A control does not fit, or the model fails.
     pub fn generate(
         &self,
-        model: &dyn TransitionModel,
+        model: &dyn Generator,
         change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
     ) -> Result<Vec<Generated>, FiguresError> {
         let requests: Vec<SequenceRequest> = self
@@ -141,24 +141,24 @@ impl<'d> Stage<'d> {
             .iter()
             .map(|window| change(window.request.clone()))
             .collect::<Result<_, _>>()?;
-        let transitions: Vec<TransitionRequest> = requests
+        let pieces: Vec<Request> = requests
             .iter()
-            .map(|request| request.transition(1, request.keyframes[0].keyframe.clone()))
+            .map(|request| request.piece(&request.keyframes))
             .collect();
-        let predicted: Vec<Vec<Transition>> = transitions
+        let predicted: Vec<Vec<Array2<f64>>> = pieces
             .par_chunks(CHUNK)
-            .map(|chunk| model.transitions(chunk))
-            .collect::<Result<_, _>>()?;
+            .map(|chunk| model.raw(chunk))
+            .collect::<Result<_, ModelError>>()?;
         let predicted = predicted.into_iter().flatten();
         let generated = requests
             .into_iter()
             .zip(predicted)
             .map(|(request, predicted)| {
-                predicted.check(request.frames() - 1)?;
+                check_frames(predicted.view(), request.frames() - 1)?;
                 let mut frames = Array2::zeros((request.frames(), FRAME));
                 let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
                 frames.row_mut(0).assign(&first);
-                frames.slice_mut(s![1.., ..]).assign(&predicted.frames);
+                frames.slice_mut(s![1.., ..]).assign(&predicted);
                 Ok(Generated { request, frames })
             });
         generated.collect()

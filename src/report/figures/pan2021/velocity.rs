@@ -3,8 +3,8 @@
 use super::root::mean_body_distance;
 use super::stage::{Generated, Stage};
 use super::wording::{Verdict, mean, percent};
-use crate::evaluation::{Response, mean_rows, mean_velocity_factors};
-use crate::models::transition::TransitionModel;
+use crate::models::Generator;
+use crate::models::transition::effect::{Response, mean_rows, mean_velocity_factors};
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line};
 use crate::report::figures::{Figure, FiguresError, Numbers};
@@ -20,7 +20,7 @@ const GAINS: [f64; 2] = [0.5, 1.5];
 const PART_GAINS: [f64; PARTS] = [1.0, 1.5, 1.0, 1.5, 1.0];
 
 /// Figure 4 (b): velocity factors along a generated motion, one that passes through its keyframes.
-pub fn figure_4b(stage: &Stage, model: &dyn TransitionModel) -> Result<Figure, FiguresError> {
+pub fn figure_4b(stage: &Stage, model: &dyn Generator) -> Result<Figure, FiguresError> {
     let request = &stage.shown().request;
     let sequence = synthesise(model, request, &SynthesisOptions::default(), model.name())?;
     let factors = measured_velocity_factors(sequence.features.view());
@@ -72,7 +72,7 @@ pub fn figure_4b(stage: &Stage, model: &dyn TransitionModel) -> Result<Figure, F
 /// Figure 8: all velocity factors times 1.0, 0.5 and 1.5.
 pub fn figure_8(
     stage: &Stage,
-    model: &dyn TransitionModel,
+    model: &dyn Generator,
     plain: &[Generated],
 ) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
@@ -120,7 +120,7 @@ pub fn figure_8(
 /// Figure 9: the velocity factors of right arm and left leg times 1.5.
 pub fn figure_9(
     stage: &Stage,
-    model: &dyn TransitionModel,
+    model: &dyn Generator,
     plain: &[Generated],
 ) -> Result<Figure, FiguresError> {
     let faster = stage.generate(model, |request| request.velocity_times(PART_GAINS))?;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::evaluation::Response;
+use crate::models::transition::effect::Response;
 
 /// Whether a model follows a control; its `Display` is the end of a caption.
 pub struct Verdict<'a> {

@@ -2,23 +2,18 @@
 
 use std::fmt;
 
-use rayon::prelude::*;
-
-use super::Feed;
-use super::gradient_check::{GradientCase, GradientCheckConfig, GradientCheckError, check_model};
+use super::ModelError;
+use super::settings::{GradientCheckOptions, ModelSettings};
 use crate::autograd::check::{CheckReport, ParameterReport};
-use crate::models::ModelConfig;
 
 /// Largest error that passes.
 const TOLERANCE: f64 = 1e-5;
 /// Largest share of numbers that may stand at a kink.
 const MOST_KINKS: f64 = 0.02;
-/// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
-const TRANSITIONS: [usize; 2] = [12, 6];
-
 /// A check of each case that the model has; its `Display` is a table for each and a line on them all.
 pub struct GradientReport {
-    cases: Vec<(GradientCase, CheckReport)>,
+    /// Title and report.
+    cases: Vec<(String, CheckReport)>,
 }
 
 /// Why a gradient does not pass.
@@ -33,27 +28,16 @@ pub enum GradientFault {
 }
 
 impl GradientReport {
-    /// Checks the model with its own predictions fed and the truth, with dropout and without, on transitions of `frames` frames, or of
-    /// more and of fewer frames than two times m without a number.
+    /// Checks a model in all the ways that it is trained.
     ///
     /// # Errors
     /// The model has nothing to train, or an operation fails.
     pub fn of(
-        model: &ModelConfig,
-        frames: Option<usize>,
-        config: GradientCheckConfig,
-    ) -> Result<Self, GradientCheckError> {
-        let cases = cases(frames);
-        let reports = cases
-            .par_iter()
-            .map(|&case| check_model(model, case, config))
-            .collect::<Result<Vec<_>, _>>()?;
-        let cases = cases.into_iter().zip(reports);
-        Ok(Self {
-            cases: cases
-                .filter_map(|(case, report)| Some((case, report?)))
-                .collect(),
-        })
+        model: &dyn ModelSettings,
+        options: &GradientCheckOptions,
+    ) -> Result<Self, ModelError> {
+        let cases = model.check_gradients(options)?;
+        Ok(Self { cases })
     }
 
     /// Whether it passes.
@@ -89,8 +73,8 @@ impl GradientReport {
 
 impl fmt::Display for GradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (case, report) in &self.cases {
-            writeln!(f, "{}", title(case))?;
+        for (title, report) in &self.cases {
+            writeln!(f, "{title}")?;
             writeln!(f, "{}", table(report))?;
         }
         writeln!(
@@ -101,32 +85,6 @@ impl fmt::Display for GradientReport {
             self.error()
         )
     }
-}
-
-fn cases(frames: Option<usize>) -> Vec<GradientCase> {
-    let transitions = frames.map_or(TRANSITIONS.to_vec(), |frames| vec![frames]);
-    let mut cases = Vec::new();
-    for transition in transitions {
-        for feed in [Feed::Predictions, Feed::GroundTruth] {
-            for dropout in [false, true] {
-                cases.push(GradientCase {
-                    transition,
-                    feed,
-                    dropout,
-                });
-            }
-        }
-    }
-    cases
-}
-
-fn title(case: &GradientCase) -> String {
-    let feed = match case.feed {
-        Feed::GroundTruth => "the truth fed",
-        Feed::Predictions => "own predictions fed",
-    };
-    let dropout = if case.dropout { "on" } else { "off" };
-    format!("N = {}, {feed}, dropout {dropout}", case.transition)
 }
 
 /// A row for each part of the network: what its parameters' names begin with.

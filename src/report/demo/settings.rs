@@ -1,10 +1,12 @@
 //! What the demo generates and trains.
 
-use super::{ConfigError, ExperimentConfig, ValueError};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
 use crate::data::{DataError, Dataset};
+use crate::experiment::{ConfigError, ExperimentConfig};
+use crate::models::settings::ValueError;
+use crate::models::transition::TransitionSettings;
 
-const EXPERIMENT: &str = include_str!("../../experiments/demo.toml");
+const EXPERIMENT: &str = include_str!("../../../experiments/demo.toml");
 
 /// Why there is nothing to generate or to train.
 #[derive(Debug, thiserror::Error)]
@@ -41,10 +43,10 @@ impl DemoSettings {
         };
         if reduced {
             (choreography.clips, choreography.frames_per_clip) = (12, 450);
-            experiment.schedule.fraction = 0.1;
+            set_fraction(&mut experiment, 0.1);
         }
         if let Some(fraction) = fraction {
-            experiment.schedule.fraction = fraction;
+            set_fraction(&mut experiment, fraction);
             experiment.validate().map_err(DemoSettingsError::Fraction)?;
         }
         Ok(Self {
@@ -73,5 +75,11 @@ impl DemoSettings {
             choreography.frames_per_clip,
             choreography.seed
         )
+    }
+}
+
+fn set_fraction(experiment: &mut ExperimentConfig, fraction: f64) {
+    if let Some(settings) = TransitionSettings::of_mut(experiment) {
+        settings.schedule.fraction = fraction;
     }
 }

@@ -1,0 +1,222 @@
+//! Configs in layers: files on a base, a budget, `--set` on top; errors name the layer.
+
+use std::fs;
+
+use keydance::data::Split;
+use keydance::experiment::ExperimentConfig;
+use keydance::models::transition::TransitionSettings;
+
+fn settings(config: &ExperimentConfig) -> &TransitionSettings {
+    TransitionSettings::of(config).unwrap()
+}
+
+fn load(files: &[(&str, &str)], sets: &[&str]) -> Result<ExperimentConfig, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+    ExperimentConfig::load(&folder.path().join(files[0].0), &sets)
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn an_empty_config_is_the_papers() {
+    let config = load(&[("a.toml", "")], &[]).unwrap();
+    assert_eq!(config, ExperimentConfig::default());
+    assert_eq!(settings(&config).schedule.batch_size, 128);
+    assert_eq!(config.optimiser.learning_rate, 1e-4);
+    assert_eq!(settings(&config).scheduled_sampling.decay, 0.99995);
+}
+
+#[test]
+fn a_file_overrides_its_base_and_the_command_line_overrides_both() {
+    let config = load(
+        &[
+            (
+                "sub/a.toml",
+                "base = '../b.toml'\nseed = 3\nschedule.max_len = 9",
+            ),
+            (
+                "b.toml",
+                "name = 'b'\nseed = 2\n[schedule]\nmax_len = 8\nshards = 2\nfraction = 1",
+            ),
+        ],
+        &["schedule.fraction=0.25", "name=c-1", "data.split.share=0.5"],
+    )
+    .unwrap();
+    assert_eq!((config.seed, config.name.as_str()), (3, "c-1"));
+    let schedule = &settings(&config).schedule;
+    assert_eq!(
+        (schedule.max_len, schedule.shards, schedule.fraction),
+        (9, 2, 0.25)
+    );
+    assert_eq!(config.data.split, Split::Share(0.5));
+}
+
+#[test]
+fn a_budget_overrides_the_file_and_the_command_line_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let config = file(
+        "a.toml",
+        "name = 'a'\nschedule.fraction = 1\nschedule.max_len = 9",
+    );
+    let budget = file("b.toml", "schedule = { fraction = 0.5, batch_size = 16 }");
+    let set = "schedule.batch_size=32".to_string();
+    let config = ExperimentConfig::load_under(&config, Some(&budget), &[set]).unwrap();
+    let schedule = &settings(&config).schedule;
+    assert_eq!(
+        (schedule.max_len, schedule.fraction, schedule.batch_size),
+        (9, 0.5, 32)
+    );
+}
+
+#[test]
+fn what_a_budget_says_of_transformers_is_left_out_for_a_model_without_them() {
+    let rate = "optimiser.transformer_learning_rate=2e-4";
+    let of = |model: &str, sets: &[&str]| load(&[("a.toml", model)], sets).unwrap();
+    let whole = of("", &[rate]).optimiser;
+    assert_eq!(whole.rates["transformers"], 2e-4);
+    for model in [
+        "model.controllers = 'fully_connected'",
+        "model.kind = 'harvey2020'",
+    ] {
+        assert_eq!(of(model, &[rate]), of(model, &[]));
+    }
+    let text = load(
+        &[("a.toml", "")],
+        &["optimiser.transformer_learning_rate=0"],
+    );
+    let text = text.unwrap_err();
+    assert!(text.contains("= 0: expected a number above 0"), "{text}");
+}
+
+#[test]
+fn the_resolved_config_reads_back_as_itself() {
+    let config = load(
+        &[("a.toml", "[data.split.list]\ntrain = ['a']\ntest = ['b']")],
+        &[],
+    );
+    let config = config.unwrap();
+    let text = config.to_toml().unwrap();
+    assert_eq!(ExperimentConfig::parse(&text, "text").unwrap(), config);
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_file() {
+    let base = ("b.toml", "[schedule]\nmax_length = 3");
+    let text = load(&[("a.toml", "base = 'b.toml'"), base], &[]).unwrap_err();
+    assert!(
+        text.contains("b.toml") && text.contains("max_length"),
+        "{text}"
+    );
+    let text = load(&[("a.toml", "")], &["optimiser.momentum=1"]).unwrap_err();
+    assert!(
+        text.contains("--set optimiser.momentum=1") && text.contains("`momentum`"),
+        "{text}"
+    );
+    let text = load(
+        &[("a.toml", "[model]\nkind = 'interpolation'\nlayers = 2")],
+        &[],
+    );
+    let text = text.unwrap_err();
+    assert!(text.contains("a.toml") && text.contains("layers"), "{text}");
+}
+
+#[test]
+fn a_base_that_rests_on_itself_is_an_error() {
+    let files = [("a.toml", "base = 'b.toml'"), ("b.toml", "base = 'a.toml'")];
+    let text = load(&files, &[]).unwrap_err();
+    assert!(
+        text.contains("a.toml -> ") && text.contains("b.toml"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_bad_value_names_key_and_remedy() {
+    for (set, words) in [
+        (
+            "schedule.fraction=0",
+            ["schedule.fraction = 0", "above 0 and at most 1"],
+        ),
+        (
+            "schedule.fraction=nan",
+            ["schedule.fraction = NaN", "above 0"],
+        ),
+        (
+            "schedule.shards=129",
+            ["schedule.shards = 129", "from 1 to 128"],
+        ),
+        ("schedule.max_len=4", ["schedule.max_len = 4", "from 5 to"]),
+        (
+            "optimiser.learning_rate=-1",
+            ["optimiser.learning_rate = -1", "above 0"],
+        ),
+        (
+            "optimiser.rate_schedule.final_share=1.5",
+            [
+                "optimiser.rate_schedule.final_share = 1.5",
+                "at least 0 and at most 1",
+            ],
+        ),
+        (
+            "optimiser.rate_schedule.shape=step",
+            ["--set optimiser.rate_schedule.shape=step", "cosine"],
+        ),
+        ("seed=-1", ["--set seed=-1", "-1"]),
+        ("seed", ["--set seed", "no '='"]),
+        ("a..b=1", ["--set a..b=1", "dotted key"]),
+        ("name=[1", ["--set name=[1", "not TOML"]),
+        ("name=../x", ["name = ../x", "letters"]),
+        ("schedule=3", ["--set schedule=3", "schedule"]),
+        (
+            "checkpoint.every_steps=0",
+            ["every_steps = 0", "at least 1"],
+        ),
+        ("checkpoint.keep=0", ["checkpoint.keep = 0", "from 1 to"]),
+        ("log.every_steps=0", ["log.every_steps = 0", "at least 1"]),
+        (
+            "scheduled_sampling.decay=1.5",
+            ["scheduled_sampling.decay = 1.5", "at most 1"],
+        ),
+        ("optimiser.beta1=1", ["optimiser.beta1 = 1", "below 1"]),
+        (
+            "optimiser.clip_norm=0",
+            ["optimiser.clip_norm = 0", "a number above 0"],
+        ),
+        (
+            "seed=9223372036854775808",
+            ["seed=9223372036854775808", "seed"],
+        ),
+        (
+            "validation={ every_steps = 0 }",
+            ["validation.every_steps = 0", "at least 1"],
+        ),
+        (
+            "validation={ every_steps = 9, lengths = [] }",
+            ["validation.lengths = []", "at least one length"],
+        ),
+    ] {
+        let text = load(&[("a.toml", "")], &[set]).unwrap_err();
+        assert!(
+            words.iter().all(|word| text.contains(word)),
+            "{set}: {text}"
+        );
+    }
+    let text = load(&[("a.toml", "seed = = 3")], &[]).unwrap_err();
+    assert!(text.contains("a.toml") && text.contains("line 1"), "{text}");
+}
+
+#[test]
+fn differences_name_the_key_and_both_values() {
+    let other = load(&[("a.toml", "schedule.fraction = 0.5")], &[]).unwrap();
+    let found = ExperimentConfig::default().differences(&other).unwrap();
+    assert_eq!(found, ["schedule.fraction: 1.0, 0.5"]);
+}
