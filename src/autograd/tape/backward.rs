@@ -236,8 +236,8 @@ impl<'s, T: Real> Backward<'s, T> {
         }
     }
 
-    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and x [rows,
-    /// in].
+    /// Adds dW = dy^T x to the gradient of a weight W [out, in], for dy [rows, out] and
+    /// x [rows, in].
     ///
     /// Few rows (one time step of a recurrent layer) are collected first, so that a weight used at
     /// every time step gets its gradient from few large products instead of many thin ones.
