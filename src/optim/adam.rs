@@ -27,7 +27,7 @@ const CHUNK: usize = 1 << 14;
 pub struct AdamConfig {
     /// The rate, or where it has a schedule the highest.
     pub learning_rate: f64,
-    /// Rates of their own of groups of weights that the model names, such as `{ transformers = 1e-4 }`; others have
+    /// Rates of their own of groups of weights that the model names, such as `{ encoder = 1e-4 }`; others have
     /// `learning_rate`. They follow the same schedule.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub rates: BTreeMap<String, f64>,
