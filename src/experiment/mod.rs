@@ -18,5 +18,5 @@ pub use demo::{DemoSettings, DemoSettingsError};
 pub use error::ReproduceError;
 pub use evaluated::{EvaluatedError, EvaluatedRun};
 pub use layers::ConfigError;
-pub use reproduce::{Ending, Observer, Reproduction};
+pub use reproduce::{Ending, Observer, Reproduction, StepObserver};
 pub use rows::{Row, Seeds};

@@ -1,4 +1,5 @@
-//! What `keydance reproduce` writes beside the rows: tables, the figure of LRP over transition length, and a manifest of everything.
+//! What `keydance reproduce` writes beside the rows: tables, the figure of LRP over transition
+//! length, and a manifest of everything.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -28,10 +28,12 @@ pub struct Seeds {
     pub seeds: Vec<u64>,
 }
 
-/// All rows of a folder of configs: first every model once, those of `order` before the others, which go by name, then further seeds.
+/// All rows of a folder of configs: first every model once, those of `order` before the others,
+/// which go by name, then further seeds.
 ///
 /// # Errors
-/// The folder holds no config, one is bad, two have the same name, or seeds are given for a model that is not there.
+/// The folder holds no config, one is bad, two have the same name, or seeds are given for a model
+/// that is not there.
 pub fn read(
     folder: &Path,
     budget: Option<&Path>,
@@ -41,8 +43,12 @@ pub fn read(
 ) -> Result<Vec<Row>, ReproduceError> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
-        let config = ExperimentConfig::load_under(&file, budget, sets)
-            .map_err(|source| ReproduceError::NoRow { file, source })?;
+        let config = ExperimentConfig::load_under(&file, budget, sets).map_err(|error| {
+            ReproduceError::NoRow {
+                file,
+                source: error.into(),
+            }
+        })?;
         if configs.iter().any(|other| other.name == config.name) {
             return Err(ReproduceError::SameName {
                 folder: folder.into(),

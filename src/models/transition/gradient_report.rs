@@ -1,4 +1,5 @@
-//! The checks of a model's gradient in all the ways that it is trained, as text, and whether they pass.
+//! The checks of a model's gradient in all the ways that it is trained, as text, and whether they
+//! pass.
 
 use std::fmt;
 
@@ -16,7 +17,8 @@ const MOST_KINKS: f64 = 0.02;
 /// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
 const TRANSITIONS: [usize; 2] = [12, 6];
 
-/// A check of each case that the model has; its `Display` is a table for each and a line on them all.
+/// A check of each case that the model has; its `Display` is a table for each and a line on them
+/// all.
 pub struct GradientReport {
     cases: Vec<(GradientCase, CheckReport)>,
 }
@@ -33,8 +35,9 @@ pub enum GradientFault {
 }
 
 impl GradientReport {
-    /// Checks the model with its own predictions fed and the truth, with dropout and without, on transitions of `frames` frames, or of
-    /// more and of fewer frames than two times m without a number.
+    /// Checks the model with its own predictions fed and the truth, with dropout and without, on
+    /// transitions of `frames` frames, or of more and of fewer frames than two times m without a
+    /// number.
     ///
     /// # Errors
     /// The model has nothing to train, or an operation fails.

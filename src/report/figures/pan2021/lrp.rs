@@ -4,7 +4,8 @@ use crate::evaluation::TableRow;
 use crate::evaluation::paper::{self, PaperRow};
 use crate::report::{FigureError, LrpSeries, lrp_curve};
 
-/// Models whose line in the figure has the paper's beside it; those of all would bury ours, and the tables have them.
+/// Models whose line in the figure has the paper's beside it; those of all would bury ours, and the
+/// tables have them.
 const REFERENCES: [&str; 2] = ["interpolation", "whole_model"];
 
 /// The figure of the rows' scores on test clips, SVG.
@@ -18,7 +19,8 @@ pub fn lrp_figure(rows: &[TableRow]) -> Result<String, FigureError> {
     )
 }
 
-/// LRP of every model with scores, the mean over its seeds, and of two the paper's; of the whole model the paper's in any case.
+/// LRP of every model with scores, the mean over its seeds, and of two the paper's; of the whole
+/// model the paper's in any case.
 fn lrp_series(rows: &[TableRow]) -> Vec<LrpSeries> {
     let mut series: Vec<LrpSeries> = Vec::new();
     for row in rows {

@@ -146,7 +146,8 @@ impl Cast {
         Ok(Viewer::of_request(&window.describe(), &window.request, &motions).html()?)
     }
 
-    /// Name, whether it was trained, and model: interpolation unless it is among those given, then those to set beside.
+    /// Name, whether it was trained, and model: interpolation unless it is among those given, then
+    /// those to set beside.
     fn others(&self) -> Vec<(&str, bool, &dyn TransitionModel)> {
         let mut given = self.compared.iter().chain([&self.subject]);
         let mut models: Vec<(&str, bool, &dyn TransitionModel)> = Vec::new();
