@@ -1,4 +1,5 @@
-//! `keydance demo`: reads nothing, writes a folder of results: a run on generated clips from their making to tables and figures.
+//! `keydance demo`: reads nothing, writes a folder of results: a run on generated clips from their
+//! making to tables and figures.
 
 use std::io::Write as _;
 use std::ops::ControlFlow;
@@ -27,19 +28,22 @@ use crate::training::Trainer;
 /// Exit code of a demo whose model is behind interpolation or behind itself before its training.
 const BEHIND: u8 = 4;
 
-/// Generate dance clips, train a small model on them, and write its scores beside what needs no training
+/// Generate dance clips, train a small model on them, score it beside what needs no training
 ///
-/// Needs no data, takes two to three minutes on two cores and gives the same numbers each time. Ends with exit code 4 if the
-/// model is not ahead in LRP at 100 and 150 frames, of interpolation and of the linear estimate that it was before its training.
+/// Needs no data, takes two to three minutes on two cores and gives the same numbers each time.
+/// Ends with exit code 4 if the model is not ahead in LRP at 100 and 150 frames, of interpolation
+/// and of the linear estimate that it was before its training.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Folder for the results; those of an earlier demo there are replaced
     #[arg(long, value_name = "DIR", default_value = "results/demo")]
     out: PathBuf,
-    /// Fewer and shorter clips and about a seventh of the training: about 20 seconds, the same files and the same demand on the model
+    /// Fewer and shorter clips and about a seventh of the training: about 20 seconds, the same
+    /// files and the same demand on the model
     #[arg(long)]
     reduced: bool,
-    /// Share of the demo's schedule that is trained, above 0 and at most 1, instead of the one in experiments/demo.toml
+    /// Share of the demo's schedule that is trained, above 0 and at most 1, instead of the one in
+    /// experiments/demo.toml
     #[arg(long, value_name = "F")]
     fraction: Option<f64>,
     #[command(flatten)]
@@ -131,7 +135,8 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Trains to the end of the schedule and shows the progress on stderr. The model with its initial weights, and the losses.
+/// Trains to the end of the schedule and shows the progress on stderr. The model with its initial
+/// weights, and the losses.
 fn train(
     config: &ExperimentConfig,
     dataset: &Dataset,

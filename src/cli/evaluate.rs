@@ -1,4 +1,5 @@
-//! `keydance evaluate`: reads a run's folder (or the config of a model that needs no training) and a data folder, writes scores.
+//! `keydance evaluate`: reads a run's folder (or the config of a model that needs no training) and
+//! a data folder, writes scores.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -25,17 +26,19 @@ pub struct EvaluateArgs {
     /// Which clips to score on
     #[arg(long, value_enum, default_value_t)]
     clips: ClipChoice,
-    /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is the mean over these
+    /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is
+    /// the mean over these
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
     lengths: Vec<u16>,
-    /// Write the scores here, too; a run's folder gets those of its own model at the paper's lengths anyway, as evaluation.json
-    /// (evaluation_validation.json, evaluation_train.json)
+    /// Write the scores here, too; a run's folder gets those of its own model at the paper's
+    /// lengths anyway, as evaluation.json (evaluation_validation.json, evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Override a key of the config, such as data.split.share=0.8; of a run's model only model.velocity_refinement; may be repeated
+    /// Override a key of the config, such as data.split.share=0.8; of a run's model only
+    /// model.velocity_refinement; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Evaluate on other data than the run was trained on, or split otherwise
@@ -46,7 +49,8 @@ pub struct EvaluateArgs {
 }
 
 /// # Errors
-/// The run, its weights or the data cannot be used, or do not fit each other; nothing is written then. A file cannot be written.
+/// The run, its weights or the data cannot be used, or do not fit each other; nothing is written
+/// then. A file cannot be written.
 pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
     if subject.run.is_some() && args.out.is_some() {

@@ -1,5 +1,5 @@
-//! `keydance export-batch`: a batch with a trained model's outputs, losses and gradients, for comparison with another
-//! implementation (`scripts/compare_pytorch.py check`).
+//! `keydance export-batch`: a batch with a trained model's outputs, losses and gradients, for
+//! comparison with another implementation (`scripts/compare_pytorch.py check`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,5 @@
-//! `keydance figures`: reads a run's folder and a data folder, writes the paper's figures with captions and numbers.
+//! `keydance figures`: reads a run's folder and a data folder, writes the paper's figures with
+//! captions and numbers.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -15,9 +16,12 @@ use crate::run::{Subject, replace_file};
 
 /// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
 ///
-/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a test clip: by default the one in the middle of the first clip by name. Captions and CSV files give means
-/// over such a transition of every test clip that is long enough. A model follows a control where it gives at least a third of the change that is asked
-/// for; the captions of figures 6 to 9 say so where it does not. Motion is shown as the model predicts it, neither bent onto the keyframes nor cleaned up.
+/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
+/// test clip: by default the one in the middle of the first clip by name. Captions and CSV files
+/// give means over such a transition of every test clip that is long enough. A model follows a
+/// control where it gives at least a third of the change that is asked for; the captions of figures
+/// 6 to 9 say so where it does not. Motion is shown as the model predicts it, neither bent onto the
+/// keyframes nor cleaned up.
 #[derive(Debug, Args)]
 pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -52,7 +56,8 @@ pub struct FiguresArgs {
 }
 
 /// # Errors
-/// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is written then. A file cannot be written.
+/// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is
+/// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &[])?;
     let compared: Vec<Subject> = args

@@ -1,4 +1,5 @@
-//! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between them as BVH.
+//! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between
+//! them as BVH.
 
 mod keyframes;
 mod trajectory;
@@ -24,8 +25,10 @@ use velocity::VelocityArgs;
 
 /// Generate the dance between keyframes and write it as BVH
 ///
-/// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a file at another rate is resampled first, so frame 120 of the
-/// file's own 120 a second is frame 30 here. The result passes through every keyframe. Keyframes of several dancers are put onto the first one's bones.
+/// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a
+/// file at another rate is resampled first, so frame 120 of the file's own 120 a second is frame 30
+/// here. The result passes through every keyframe. Keyframes of several dancers are put onto the
+/// first one's bones.
 #[derive(Debug, Args)]
 pub struct GenerateArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -43,20 +46,22 @@ pub struct GenerateArgs {
     /// Pin the feet where the model predicts contact
     #[arg(long)]
     foot_cleanup: bool,
-    /// Show the motion beside interpolation and, where keyframes come from --motion at their own distances, the recorded motion: one HTML page
-    /// that needs no network
+    /// Show the motion beside interpolation and, where keyframes come from --motion at their own
+    /// distances, the recorded motion: one HTML page that needs no network
     #[arg(long, value_name = "OUT.html")]
     viewer: Option<PathBuf>,
     /// Write what is printed here, too, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Override a key of the config; of a run's model only model.velocity_refinement, such as model.velocity_refinement=false; may be repeated
+    /// Override a key of the config; of a run's model only model.velocity_refinement, such as
+    /// model.velocity_refinement=false; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
 
 /// # Errors
-/// The run, a file or a control cannot be used, or they do not fit each other; nothing is written then. A file cannot be written.
+/// The run, a file or a control cannot be used, or they do not fit each other; nothing is written
+/// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
     let keyframes = Keyframes::read(&args.keyframes.choice(), &subject.config.data)?;
@@ -95,7 +100,8 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The clip as a document with the input's channels, or with Z X Y rotations where the input has no such hierarchy.
+/// The clip as a document with the input's channels, or with Z X Y rotations where the input has no
+/// such hierarchy.
 fn document(clip: &Clip, channels: Option<&[Vec<Channel>]>) -> anyhow::Result<Bvh> {
     let channels = match channels {
         Some(channels) => channels.to_vec(),

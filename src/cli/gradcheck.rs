@@ -11,7 +11,8 @@ use crate::models::settings::GradientCheckOptions;
 
 #[derive(Debug, Args)]
 pub struct GradcheckArgs {
-    /// Experiment whose model is checked, such as experiments/pan2021/one_lstm.toml; without one, the whole model
+    /// Experiment whose model is checked, such as experiments/pan2021/one_lstm.toml; without one,
+    /// the whole model
     config: Option<PathBuf>,
     /// Override a value of the config, such as model.loss.key=0
     #[arg(long, value_name = "KEY=VALUE", requires = "config")]
@@ -34,7 +35,8 @@ pub struct GradcheckArgs {
 }
 
 /// # Errors
-/// The config cannot be read or has nothing to train; a gradient is wrong, or too many numbers could not be compared.
+/// The config cannot be read or has nothing to train; a gradient is wrong, or too many numbers
+/// could not be compared.
 pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
     let experiment = match &args.config {
         Some(path) => ExperimentConfig::load(path, &args.set)?,

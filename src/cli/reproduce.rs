@@ -1,4 +1,5 @@
-//! `keydance reproduce`: reads a folder of configs and a data folder, trains and evaluates each, writes tables, figures and a manifest.
+//! `keydance reproduce`: reads a folder of configs and a data folder, trains and evaluates each,
+//! writes tables, figures and a manifest.
 
 use std::collections::HashSet;
 use std::io::{self, Write as _};
@@ -16,17 +17,20 @@ use super::train;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
-use crate::experiment::{Ending, Observer, ReproduceError, Reproduction, Row, Seeds, rows};
+use crate::experiment::{
+    Ending, Observer, ReproduceError, Reproduction, Row, Seeds, StepObserver, rows,
+};
 use crate::models::Generator;
-use crate::training::{Resumed, StepReport, Trainer, TrainingError};
+use crate::training::{Resumed, Trainer, TrainingError};
 
 /// Train and evaluate every config of a folder, and write tables, figures and a manifest
 ///
-/// Trains every config of a folder that is not trained yet, evaluates it on the test clips and writes tables 2 to 4 with the paper's
-/// value, ours and the difference, figures and a manifest.
+/// Trains every config of a folder that is not trained yet, evaluates it on the test clips and
+/// writes tables 2 to 4 with the paper's value, ours and the difference, figures and a manifest.
 ///
-/// A row whose results are in OUT is done. A row whose run is in RUNS goes on from its newest checkpoint, also after a kill; the end
-/// is the same to the bit as without the break. Tables are written again after every row; rows that are missing show "—".
+/// A row whose results are in OUT is done. A row whose run is in RUNS goes on from its newest
+/// checkpoint, also after a kill; the end is the same to the bit as without the break. Tables are
+/// written again after every row; rows that are missing show "—".
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
     /// Folder of configs, such as experiments/pan2021
@@ -38,7 +42,8 @@ pub struct ReproduceArgs {
     /// Folder for the results, small files: tables, figures, manifest, and a folder for each row
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder for the runs, large: checkpoints, logs and weights [default: runs/ and the name of OUT]
+    /// Folder for the runs, large: checkpoints, logs and weights [default: runs/ and the name of
+    /// OUT]
     #[arg(long, value_name = "DIR")]
     runs: Option<PathBuf>,
     /// Config of overrides for all rows alike, such as experiments/budgets/pan2021.toml
@@ -50,13 +55,15 @@ pub struct ReproduceArgs {
     /// Train and evaluate these models only; the tables keep what there is of the others
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
-    /// Train a model from several seeds, such as whole_model=1,2,3, and show the spread; may be repeated
+    /// Train a model from several seeds, such as whole_model=1,2,3, and show the spread; may be
+    /// repeated
     #[arg(long, value_name = "NAME=SEEDS", value_parser = parse_seeds)]
     seeds: Vec<Seeds>,
     /// Train nothing: evaluate the runs that are finished and write the tables
     #[arg(long)]
     no_training: bool,
-    /// Rows to train at the same time, the threads shared among them; no number in the result depends on it
+    /// Rows to train at the same time, the threads shared among them; no number in the result
+    /// depends on it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
     #[command(flatten)]
@@ -78,8 +85,8 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 }
 
 /// # Errors
-/// Configs or data cannot be used; results or a run are of another config or other data; a training diverged (the other rows are
-/// trained all the same); a file cannot be written.
+/// Configs or data cannot be used; results or a run are of another config or other data; a training
+/// diverged (the other rows are trained all the same); a file cannot be written.
 pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
     let (rows, printed) = rows::read(
         &args.configs,
@@ -168,7 +175,7 @@ impl Observer for Terminal {
         row: &Row,
         trainer: &Trainer<'_>,
         resumed: &Resumed,
-    ) -> io::Result<Box<dyn FnMut(&StepReport)>> {
+    ) -> io::Result<StepObserver> {
         train::goes_on(resumed)?;
         let (task, before) = (trainer.task(), trainer.frame_steps_done());
         let mut progress = match self.alone {

@@ -1,4 +1,5 @@
-//! `keydance tables`: reads runs' folders that `keydance evaluate` has been through, writes a Markdown file.
+//! `keydance tables`: reads runs' folders that `keydance evaluate` has been through, writes a
+//! Markdown file.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -21,7 +22,8 @@ pub struct TablesArgs {
 }
 
 /// # Errors
-/// A folder has no scores, or the scores are of different data; nothing is written then. The file cannot be written.
+/// A folder has no scores, or the scores are of different data; nothing is written then. The file
+/// cannot be written.
 pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let runs = EvaluatedRun::read_all(&args.runs)?;
     let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();

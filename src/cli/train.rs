@@ -32,7 +32,8 @@ pub struct TrainArgs {
     /// Override a key of the config, such as schedule.fraction=0.005; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on from the newest checkpoint in RUN_DIR; the end is the same to the bit as without the break
+    /// Go on from the newest checkpoint in RUN_DIR; the end is the same to the bit as without the
+    /// break
     #[arg(long)]
     resume: bool,
     #[command(flatten)]

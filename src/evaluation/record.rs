@@ -1,5 +1,6 @@
-//! A model's scores in a folder: `evaluation.json`, and `evaluation_data.json` that says on what they were measured. Scores on other
-//! clips than the test clips have files of their own, such as `evaluation_validation.json`.
+//! A model's scores in a folder: `evaluation.json`, and `evaluation_data.json` that says on what
+//! they were measured. Scores on other clips than the test clips have files of their own, such as
+//! `evaluation_validation.json`.
 
 use std::path::{Path, PathBuf};
 

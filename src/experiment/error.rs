@@ -24,7 +24,10 @@ pub enum ReproduceError {
     #[error("{folder} holds no config (.toml)")]
     NoConfig { folder: PathBuf },
     #[error("{file} is no row")]
-    NoRow { file: PathBuf, source: ConfigError },
+    NoRow {
+        file: PathBuf,
+        source: Box<ConfigError>,
+    },
     #[error("two configs in {folder} are called {name}; give each a name of its own")]
     SameName { folder: PathBuf, name: String },
     #[error("--seeds names {name} twice; give all its seeds in one list")]
@@ -67,7 +70,10 @@ pub enum ReproduceError {
     },
     /// What a row asks for cannot be trained.
     #[error("{row}")]
-    Row { row: String, source: TrainingError },
+    Row {
+        row: String,
+        source: Box<TrainingError>,
+    },
     #[error("no pool of {threads} threads: {cause}")]
     Threads {
         threads: usize,

@@ -13,5 +13,5 @@ pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig
 pub use error::ReproduceError;
 pub use evaluated::{EvaluatedError, EvaluatedRun};
 pub use layers::ConfigError;
-pub use reproduce::{Ending, Observer, Reproduction};
+pub use reproduce::{Ending, Observer, Reproduction, StepObserver};
 pub use rows::{Row, Seeds};

@@ -1,4 +1,5 @@
-//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them all.
+//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them
+//! all.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -18,7 +19,8 @@ use crate::models::Generator;
 use crate::run::{RunError, RunFolder, RunState};
 use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
 
-/// Is told how a reproduction goes, by several threads where several rows are trained at the same time, and may stop it.
+/// Is told how a reproduction goes, by several threads where several rows are trained at the same
+/// time, and may stop it.
 ///
 /// An error of a method ends the reproduction: what it says cannot be written any more.
 pub trait Observer: Sync {
@@ -43,7 +45,7 @@ pub trait Observer: Sync {
         row: &Row,
         trainer: &Trainer<'_>,
         resumed: &Resumed,
-    ) -> io::Result<Box<dyn FnMut(&StepReport)>>;
+    ) -> io::Result<StepObserver>;
 
     /// Evaluates a model on the test clips as `protocol` says: whoever shows how far that is wraps the model.
     fn evaluate(
@@ -58,6 +60,9 @@ pub trait Observer: Sync {
     /// Whether to stop after the step at hand.
     fn stop_asked(&self) -> bool;
 }
+
+/// Is told each step of a training.
+pub type StepObserver = Box<dyn FnMut(&StepReport)>;
 
 /// What is trained and evaluated, on what, and where it goes.
 pub struct Reproduction<'a> {
@@ -101,10 +106,12 @@ enum RowOutcome {
 }
 
 impl Reproduction<'_> {
-    /// Trains and evaluates what is left of the chosen rows, and writes the tables again after each.
+    /// Trains and evaluates what is left of the chosen rows, and writes the tables again after
+    /// each.
     ///
     /// # Errors
-    /// Results or a run are of another config or other data; a file cannot be read or written; the observer has an error.
+    /// Results or a run are of another config or other data; a file cannot be read or written; the
+    /// observer has an error.
     pub fn run(&self) -> Result<Ending, ReproduceError> {
         DataPart::Test.of(self.dataset)?;
         for row in self.rows {
@@ -188,12 +195,13 @@ impl Reproduction<'_> {
         RowResults::of(row, self.out).read(row, self.dataset)?;
         let run = self.run_of(row);
         if !run.config_path().exists() {
-            // The model, the schedule and the validation are refused here, not when hours of other rows are over.
+            // The model, the schedule and the validation are refused here, not when hours of other
+            // rows are over.
             if row.is_trained() && !self.no_training {
-                Trainer::new(row.config.clone(), self.dataset, 1).map_err(|source| {
+                Trainer::new(row.config.clone(), self.dataset, 1).map_err(|error| {
                     ReproduceError::Row {
                         row: row.folder.clone(),
-                        source,
+                        source: error.into(),
                     }
                 })?;
             }

@@ -1,4 +1,5 @@
-//! The results of a row: a small folder beside the tables, from which they can be made again without the run.
+//! The results of a row: a small folder beside the tables, from which they can be made again
+//! without the run.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,8 @@ impl RowResults {
     /// The scores, if the row is done.
     ///
     /// # Errors
-    /// The folder holds results of another config or other data (both are named), or a file of it is damaged.
+    /// The folder holds results of another config or other data (both are named), or a file of it
+    /// is damaged.
     pub fn read(
         &self,
         row: &Row,

@@ -37,7 +37,8 @@ const PRINTED: &str = "paper.toml";
 /// Where `only` names some rows, `sets` reach the others as far as they know the key.
 ///
 /// # Errors
-/// The folder holds no config, one is bad, two have the same name, or seeds are given for a model that is not there.
+/// The folder holds no config, one is bad, two have the same name, or seeds are given for a model
+/// that is not there.
 pub fn read(
     folder: &Path,
     budget: Option<&Path>,
@@ -47,7 +48,8 @@ pub fn read(
 ) -> Result<(Vec<Row>, PrintedTables), ReproduceError> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
-        let load = |sets: &[String]| ExperimentConfig::load_under(&file, budget, sets);
+        let load =
+            |sets: &[String]| ExperimentConfig::load_under(&file, budget, sets).map_err(Box::new);
         let no_row = |source| ReproduceError::NoRow {
             file: file.clone(),
             source,

@@ -1,4 +1,5 @@
-//! The checks of a model's gradient in all the ways that it is trained, as text, and whether they pass.
+//! The checks of a model's gradient in all the ways that it is trained, as text, and whether they
+//! pass.
 
 use std::fmt;
 

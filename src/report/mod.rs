@@ -1,6 +1,8 @@
-//! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as HTML.
+//! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as
+//! HTML.
 //!
-//! A figure knows numbers and positions only, no model and no training; the figures of a paper in [`figures`] ask models for them.
+//! A figure knows numbers and positions only, no model and no training; the figures of a paper in
+//! [`figures`] ask models for them.
 
 pub mod camera;
 pub mod chart;

@@ -30,7 +30,8 @@ const HEADER: [&str; 12] = [
 /// Columns of text; the others hold numbers and are aligned on the right.
 const TEXT: [usize; 4] = [0, 1, 2, 11];
 
-/// The runs at and below a folder, by their paths; its `Display` is a table, and a line for each thing that is wrong with a run.
+/// The runs at and below a folder, by their paths; its `Display` is a table, and a line for each
+/// thing that is wrong with a run.
 pub struct RunTable {
     rows: Vec<Row>,
 }

@@ -56,6 +56,7 @@ pub enum SubjectError {
     },
 }
 
+/// A model to work with, its config, and where they come from.
 pub struct Subject {
     pub config: ExperimentConfig,
     pub model: Box<dyn Generator>,
@@ -66,7 +67,8 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// Opens a run's folder, or the config of a model that needs no training; `set` overrides keys of the config.
+    /// Opens a run's folder, or the config of a model that needs no training; `set` overrides keys
+    /// of the config.
     ///
     /// # Errors
     /// There is no such run or config, its model is not trained, or its weights are damaged.
@@ -108,7 +110,8 @@ impl Subject {
     /// Refuses data that the run was not trained on: its training clips may be test clips there.
     ///
     /// # Errors
-    /// The config reads or splits the data otherwise than the run's, or the data has another digest than the run's manifest says.
+    /// The config reads or splits the data otherwise than the run's, or the data has another digest
+    /// than the run's manifest says.
     pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), SubjectError> {
         let Some(run) = &self.run else {
             return Ok(());
@@ -138,7 +141,8 @@ impl Subject {
         Ok(())
     }
 
-    /// The folder that keeps the scores: the run's, or for a config `out`, made with the config in it; none where there is neither.
+    /// The folder that keeps the scores: the run's, or for a config `out`, made with the config in
+    /// it; none where there is neither.
     ///
     /// # Errors
     /// `out` holds another config, or cannot be written.

@@ -49,8 +49,9 @@ impl FromStr for FileKeyframe {
 /// Which keyframes a result has.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct KeyframeChoice {
-    /// A dancer's file, which gives the controls between its keyframes, too, and its frames that are keyframes, ascending: the first
-    /// becomes frame 0 of the result, the others keep their distances.
+    /// A dancer's file, which gives the controls between its keyframes, too, and its frames that
+    /// are keyframes, ascending: the first becomes frame 0 of the result, the others keep their
+    /// distances.
     pub motion: Option<(PathBuf, Vec<usize>)>,
     /// Keyframes beside those.
     pub further: Vec<FileKeyframe>,
@@ -80,7 +81,10 @@ pub enum KeyframeError {
     #[error(transparent)]
     Bvh(#[from] BvhError),
     #[error("{file} cannot be used")]
-    Clip { file: PathBuf, source: DataError },
+    Clip {
+        file: PathBuf,
+        source: Box<DataError>,
+    },
     #[error(
         "the result ends at frame {end}, but {file} ends {last} frames after its first keyframe; give earlier keyframes, or --keyframe only"
     )]
@@ -203,12 +207,13 @@ impl Keyframes {
         let clip =
             DanceClip::new(clip, mapping, &self.data).map_err(|source| KeyframeError::Clip {
                 file: path.into(),
-                source,
+                source: source.into(),
             })?;
         Ok(Source { clip, channels })
     }
 
-    /// Velocity factors of a further file, read on the same terms, in `frames` frames from its frame `first` on, `[frames, 5]`, cm/frame.
+    /// Velocity factors of a further file, read on the same terms, in `frames` frames from its
+    /// frame `first` on, `[frames, 5]`, cm/frame.
     ///
     /// # Errors
     /// It cannot be read, is on another skeleton or ends too early.
@@ -244,8 +249,8 @@ impl Keyframes {
         Some(&self.sources[path].clip)
     }
 
-    /// What the dancer does in the frames of a request, `[F, 154]`; none where the request has other keyframes than its, or has them at other
-    /// distances.
+    /// What the dancer does in the frames of a request, `[F, 154]`; none where the request has
+    /// other keyframes than its, or has them at other distances.
     pub fn recorded(&self, request: &SequenceRequest) -> Option<ArrayView2<'_, f64>> {
         let (path, first) = self.motion.as_ref()?;
         let its_own = |keyframe: &FileKeyframe| {
@@ -266,12 +271,13 @@ impl Keyframes {
         self.sources[&first.file].channels.as_deref()
     }
 
-    /// The request: trajectory and velocity factors of the dancer's clip where there is one. `lengths`: frames from each of its keyframes
-    /// to the next, none for their own distances, one for all, or one for each.
+    /// The request: trajectory and velocity factors of the dancer's clip where there is one.
+    /// `lengths`: frames from each of its keyframes to the next, none for their own distances, one
+    /// for all, or one for each.
     ///
     /// # Errors
-    /// Frames that a file does not have; dancers that do not fit each other; keyframes beyond the end of the dancer's clip; lengths that
-    /// do not fit the keyframes.
+    /// Frames that a file does not have; dancers that do not fit each other; keyframes beyond the
+    /// end of the dancer's clip; lengths that do not fit the keyframes.
     pub fn request(&self, lengths: &[u32]) -> Result<SequenceRequest, KeyframeError> {
         let sources: Vec<KeyframeSource> = self
             .keyframes

@@ -27,7 +27,8 @@ pub struct Summary {
 #[derive(Debug, Serialize)]
 struct KeyframeSummary {
     frame: usize,
-    /// From the joints of the model's own last frame to the keyframe's, before it was bent onto it; none for the first keyframe.
+    /// From the joints of the model's own last frame to the keyframe's, before it was bent onto it;
+    /// none for the first keyframe.
     missed: Option<Distances>,
 }
 

@@ -8,10 +8,12 @@ use crate::synthesis::keyframes::{FileKeyframe, KeyframeChoice, LONGEST};
 
 #[derive(Debug, Args)]
 pub struct KeyframeArgs {
-    /// BVH file of the dancer; gives the root trajectory and the velocity factors between its keyframes, too
+    /// BVH file of the dancer; gives the root trajectory and the velocity factors between its
+    /// keyframes, too
     #[arg(long, value_name = "FILE.bvh", requires = "keyframes")]
     motion: Option<PathBuf>,
-    /// Frames of --motion that are keyframes, ascending, such as 120,180,260; the first becomes frame 0 of the result, the others keep their distances
+    /// Frames of --motion that are keyframes, ascending, such as 120,180,260; the first becomes
+    /// frame 0 of the result, the others keep their distances
     #[arg(
         long,
         value_name = "FRAMES",
@@ -19,13 +21,15 @@ pub struct KeyframeArgs {
         requires = "motion"
     )]
     keyframes: Vec<usize>,
-    /// A frame of any file as a keyframe, and its frame in the result, such as jump.bvh:75@60; may be repeated
+    /// A frame of any file as a keyframe, and its frame in the result, such as jump.bvh:75@60; may
+    /// be repeated
     #[arg(long, value_name = "FILE.bvh:FRAME@TIME")]
     keyframe: Vec<FileKeyframe>,
     /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's]
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
-    /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such as 100,250
+    /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such
+    /// as 100,250
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion", conflicts_with = "keyframe",
         value_parser = clap::value_parser!(u32).range(1..=i64::from(LONGEST)))]
     pub length: Vec<u32>,

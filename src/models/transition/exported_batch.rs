@@ -1,4 +1,5 @@
-//! A batch with a trained model's outputs, losses and gradients, for comparison with another implementation.
+//! A batch with a trained model's outputs, losses and gradients, for comparison with another
+//! implementation.
 
 use std::collections::BTreeMap;
 
@@ -34,8 +35,8 @@ pub enum ExportError {
 /// One array of the file: its shape and its numbers, f32.
 type Entry = (Vec<usize>, Vec<f32>);
 
-/// The content of a safetensors file. Dropout is off. `window [N + 1, B, 154]`, `outputs [N, B, 149]` (own predictions fed), `loss.*`,
-/// `gradient.*`.
+/// The content of a safetensors file. Dropout is off. `window [N + 1, B, 154]`, `outputs [N, B,
+/// 149]` (own predictions fed), `loss.*`, `gradient.*`.
 ///
 /// # Errors
 /// No clip is long enough, or an operation fails.

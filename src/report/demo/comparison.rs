@@ -7,11 +7,12 @@ use crate::experiment::ExperimentConfig;
 use crate::report::{NO_TRAINING, schedule_note};
 use crate::run::Manifest;
 
-/// Lengths of transition (frames) at which a model must be ahead: where the keyframes say little of the dance between them.
+/// Lengths of transition (frames) at which a model must be ahead: where the keyframes say little of
+/// the dance between them.
 const LONG: [usize; 2] = [100, 150];
 
-/// The scores of a model, of interpolation and of the model before its training on the same windows; its `Display` sets their LRP
-/// side by side.
+/// The scores of a model, of interpolation and of the model before its training on the same
+/// windows; its `Display` sets their LRP side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     pub interpolation: Scores,

@@ -56,7 +56,8 @@ const INTERPOLATION: &str = "interpolation.json";
 const UNTRAINED: &str = "untrained.json";
 const CHOREOGRAPHY: &str = "choreography.toml";
 
-/// Removes what an earlier demo left beside its run: a demo that is interrupted must not leave results of two.
+/// Removes what an earlier demo left beside its run: a demo that is interrupted must not leave
+/// results of two.
 ///
 /// # Errors
 /// A file cannot be removed.
@@ -110,7 +111,7 @@ pub fn write_scores(
         metrics: protocol.metrics(),
         printed,
     };
-    let text = tables.markdown(rows, &settings.caption(dataset));
+    let text = tables.markdown(rows, &caption(settings, dataset));
     replace_file(&folder.join(TABLES), text.as_bytes())?;
     write_json(&folder.join(INTERPOLATION), &comparison.interpolation)?;
     write_json(&folder.join(UNTRAINED), &comparison.untrained)?;
@@ -124,6 +125,18 @@ pub fn write_scores(
         &folder.join(CHOREOGRAPHY),
         choreography.as_bytes(),
     )?)
+}
+
+/// What the scores were measured on.
+fn caption(settings: &DemoSettings, dataset: &Dataset) -> String {
+    let choreography = &settings.choreography;
+    format!(
+        "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not comparable",
+        dataset.test.len(),
+        choreography.clips,
+        choreography.frames_per_clip,
+        choreography.seed
+    )
 }
 
 /// Where the showcase of a demo goes.

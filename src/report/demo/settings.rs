@@ -29,7 +29,8 @@ pub struct DemoSettings {
 }
 
 impl DemoSettings {
-    /// The demo's settings; `reduced` to about a seventh of the training, and `fraction` in place of the schedule's own.
+    /// The demo's settings; `reduced` to about a seventh of the training, and `fraction` in place
+    /// of the schedule's own.
     ///
     /// # Errors
     /// The fraction is not a share.
@@ -63,18 +64,6 @@ impl DemoSettings {
         let clips = generate(&self.choreography)?;
         let clips = clips.into_iter().map(|generated| generated.clip).collect();
         Ok(Dataset::from_clips(clips, &self.experiment.data)?)
-    }
-
-    /// What scores on a data set of these settings were measured on, for the tables' caption.
-    pub fn caption(&self, dataset: &Dataset) -> String {
-        let choreography = &self.choreography;
-        format!(
-            "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not comparable",
-            dataset.test.len(),
-            choreography.clips,
-            choreography.frames_per_clip,
-            choreography.seed
-        )
     }
 }
 

@@ -1,4 +1,5 @@
-//! One transition of a test clip: as a BVH file, and beside interpolation and the recorded motion as a figure and in the viewer.
+//! One transition of a test clip: as a BVH file, and beside interpolation and the recorded motion
+//! as a figure and in the viewer.
 
 use std::fmt;
 use std::path::PathBuf;

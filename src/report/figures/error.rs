@@ -49,7 +49,7 @@ pub enum FiguresError {
     Scores { model: String, source: ModelError },
     #[error(transparent)]
     Figure(#[from] FigureError),
-    #[error("the numbers of a figure: {0}")]
+    #[error("the numbers of a figure")]
     Numbers(#[from] csv::Error),
     #[error(transparent)]
     File(#[from] FileError),

@@ -1,4 +1,5 @@
-//! The figures of papers: each an SVG with a caption, its numbers as CSV beside it. One file or folder a paper.
+//! The figures of papers: each an SVG with a caption, its numbers as CSV beside it. One file or
+//! folder a paper.
 
 mod error;
 mod numbers;

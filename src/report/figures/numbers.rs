@@ -17,10 +17,12 @@ struct Number {
     unit: &'static str,
 }
 
-/// The numbers behind a figure, one a line: the figure's row, measure, body part, frame, value, unit.
+/// The numbers behind a figure, one a line: the figure's row, measure, body part, frame, value,
+/// unit.
 ///
-/// Only series of generated motion stand here frame by frame; of recorded motion and of what is derived from it there are means, so that the files may be
-/// passed on where the recordings may not.
+/// Only series of generated motion stand here frame by frame; of recorded motion and of what is
+/// derived from it there are means, so that the files may be passed on where the recordings may
+/// not.
 #[derive(Debug, Clone, Default)]
 pub struct Numbers {
     lines: Vec<Number>,

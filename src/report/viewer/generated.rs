@@ -1,4 +1,5 @@
-//! The page of a generated sequence: beside interpolation and, where there is one, the recorded motion.
+//! The page of a generated sequence: beside interpolation and, where there is one, the recorded
+//! motion.
 
 use super::{MotionKind, RequestMotion, Viewer};
 use crate::models::ModelKind as _;
@@ -18,7 +19,8 @@ pub enum PageError {
     Figure(#[from] FigureError),
 }
 
-/// The page of what a subject made of a request with keyframes, HTML; interpolation is asked under the same options.
+/// The page of what a subject made of a request with keyframes, HTML; interpolation is asked under
+/// the same options.
 ///
 /// # Errors
 /// Interpolation cannot be asked, or the page has nothing to show.

@@ -75,12 +75,14 @@ fn needed(columns: &[String]) -> String {
 /// A root trajectory of `frames` frames from the columns x, y and z, `[frames, 3]`, cm.
 ///
 /// # Errors
-/// The file cannot be read, lacks columns or frames, or holds something else than numbers; with the line.
+/// The file cannot be read, lacks columns or frames, or holds something else than numbers; with the
+/// line.
 pub fn read_trajectory(path: &Path, frames: usize) -> Result<Array2<f64>, TableError> {
     read(path, &["x", "y", "z"], frames)
 }
 
-/// Velocity factors of `frames` frames from a column for each part of the body, `[frames, 5]`, cm/frame.
+/// Velocity factors of `frames` frames from a column for each part of the body, `[frames, 5]`,
+/// cm/frame.
 ///
 /// # Errors
 /// As [`read_trajectory`], and a number below 0.
@@ -97,7 +99,8 @@ pub fn read_velocity_factors(path: &Path, frames: usize) -> Result<Array2<f64>, 
     Ok(factors)
 }
 
-/// Rows of `frames` frames from a CSV file with the columns `frame` and `columns`, in any order, `[frames, columns]`.
+/// Rows of `frames` frames from a CSV file with the columns `frame` and `columns`, in any order,
+/// `[frames, columns]`.
 ///
 /// The first row is frame 0 and every frame has a row. Rows beyond the last frame are not read.
 fn read(path: &Path, columns: &[&str], frames: usize) -> Result<Array2<f64>, TableError> {
@@ -184,7 +187,8 @@ fn read(path: &Path, columns: &[&str], frames: usize) -> Result<Array2<f64>, Tab
     Ok(rows)
 }
 
-/// The line, from 1 on, of the row that is read from a byte of the text on: the reader steps over empty lines before it.
+/// The line, from 1 on, of the row that is read from a byte of the text on: the reader steps over
+/// empty lines before it.
 fn line_of(text: &str, start: usize) -> usize {
     let row = start
         + text[start..]

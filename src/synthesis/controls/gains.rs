@@ -1,4 +1,5 @@
-//! What velocity factors are multiplied by: "0.5" for all parts of the body, or "right_arm=1.5,left_leg=1.5".
+//! What velocity factors are multiplied by: "0.5" for all parts of the body, or
+//! "right_arm=1.5,left_leg=1.5".
 
 use std::str::FromStr;
 

@@ -74,8 +74,8 @@ impl FromStr for Points {
 }
 
 impl SequenceRequest {
-    /// A root trajectory along a smooth curve through points, from the first frame to the last, `[F, 3]`, cm; the heights of the request
-    /// where the points have none.
+    /// A root trajectory along a smooth curve through points, from the first frame to the last,
+    /// `[F, 3]`, cm; the heights of the request where the points have none.
     pub fn trajectory_through(&self, points: &Points, speed: &Speed) -> Array2<f64> {
         let mut trajectory = self.root_trajectory.clone();
         let path = smooth_curve(&points.points, trajectory.nrows(), speed);

@@ -15,7 +15,8 @@ const EVERY: usize = 10;
 /// What a model makes of the windows under the clips' own controls.
 pub struct Entry {
     pub name: String,
-    /// Whether it stands in figure 11: a model without training, whose root is the target itself, does not unless it is what the figures are about.
+    /// Whether it stands in figure 11: a model without training, whose root is the target itself,
+    /// does not unless it is what the figures are about.
     pub drawn_with_root: bool,
     pub generated: Vec<Generated>,
 }

@@ -19,7 +19,8 @@ const HEIGHT: f64 = 30.0;
 /// How far the trajectories of figure 7 lead aside, cm.
 const DETOUR: f64 = 60.0;
 
-/// Figure 5: generated motions and their root trajectories beside the targets. `plain`: the model under the clips' own controls.
+/// Figure 5: generated motions and their root trajectories beside the targets. `plain`: the model
+/// under the clips' own controls.
 pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, FiguresError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
@@ -186,7 +187,8 @@ pub fn figure_7(
     Figure::of_dancers("figure_7", drawing, numbers)
 }
 
-/// A trajectory from keyframe to keyframe that leads aside, once for each of `sides` (+1 to the left of the way, -1 to the right). Heights stay.
+/// A trajectory from keyframe to keyframe that leads aside, once for each of `sides` (+1 to the
+/// left of the way, -1 to the right). Heights stay.
 fn detour(request: SequenceRequest, sides: &[f64]) -> Result<SequenceRequest, SynthesisError> {
     let roots = request.keyframe_roots();
     let (from, to) = (roots[0], roots[1]);

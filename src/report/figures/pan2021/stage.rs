@@ -47,7 +47,8 @@ pub struct Generated {
 }
 
 impl<'d> Stage<'d> {
-    /// The window in the middle of every clip that is long enough, in the order of the names, the chosen one before them.
+    /// The window in the middle of every clip that is long enough, in the order of the names, the
+    /// chosen one before them.
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
@@ -127,7 +128,8 @@ impl<'d> Stage<'d> {
         format!("{what}: {model} on {}", self.shown().describe())
     }
 
-    /// What the model makes of every window under the controls that `change` sets, as it predicts it: nothing is blended or cleaned up.
+    /// What the model makes of every window under the controls that `change` sets, as it predicts
+    /// it: nothing is blended or cleaned up.
     ///
     /// # Errors
     /// A control does not fit, or the model fails.
@@ -179,7 +181,8 @@ impl Window<'_> {
 }
 
 impl Generated {
-    /// World positions of the joints with the last frame as the keyframe that was given, `[N + 1][24]`, cm.
+    /// World positions of the joints with the last frame as the keyframe that was given, `[N +
+    /// 1][24]`, cm.
     pub fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
         let mut drawn = positions(self.frames.view());
         if let (Some(last), Some(target)) = (drawn.last_mut(), self.request.keyframes.last()) {
