@@ -6,7 +6,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
 
 use super::notice::notice;
@@ -90,7 +90,13 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
     let order = paper::ROWS.map(|row| row.name);
     let budget = args.budget.as_deref();
-    let rows = rows::read(&args.configs, budget, &args.set, &args.seeds, &order)?;
+    let rows =
+        rows::read(&args.configs, budget, &args.set, &args.seeds, &order).map_err(|error| {
+            match error {
+                ReproduceError::NoConfig { .. } => anyhow!("{error}; experiments/pan2021 does"),
+                other => other.into(),
+            }
+        })?;
     let chosen = rows::chosen(&rows, &args.only, &args.configs)?;
     let runs = match (&args.runs, args.out.file_name()) {
         (Some(runs), _) => runs.clone(),
