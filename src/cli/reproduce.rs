@@ -6,7 +6,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
 
 use super::notice::notice;
@@ -94,7 +94,11 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         &args.set,
         &args.only,
         &args.seeds,
-    )?;
+    )
+    .map_err(|error| match error {
+        ReproduceError::NoConfig { .. } => anyhow!("{error}; experiments/pan2021 does"),
+        other => other.into(),
+    })?;
     let chosen = rows::chosen(&rows, &args.only, &args.configs)?;
     let runs = match (&args.runs, args.out.file_name()) {
         (Some(runs), _) => runs.clone(),
