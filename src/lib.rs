@@ -1,18 +1,23 @@
-//! Dance synthesis from keyframes.
+//! Dance synthesis: the models of several papers, side by side.
 //!
 //! The modules in reading order, the path of the data:
 //!
-//! - [`motion`] - BVH files become clips, clips become the features of each frame.
-//! - [`data`] - clips become a data set: split, standardised, cut into windows.
+//! - [`motion`] - BVH, skeletons, poses, kinematics, facing, contact; no learning.
+//! - [`data`] - files become recordings, recordings a split.
 //! - [`autograd`] - reverse-mode differentiation on a tape, and the kernels under it.
 //! - [`nn`] - layers of weights, built on the tape's operations.
-//! - [`optim`] - Adam.
-//! - [`models`] - what fills the frames between two keyframes, behind one trait.
-//! - [`training`] - curriculum, scheduled sampling, losses, the loop, checkpoints.
-//! - [`evaluation`] - LRP, AVF and ART by the paper's protocol, and its tables.
-//! - [`synthesis`] - predicted frames become motion that can be played.
-//! - [`report`] - figures of losses, scores and dancers.
-//! - [`cli`] - the subcommands of the binary.
+//! - [`optim`] - Adam, groups of learning rates, schedules.
+//! - [`models`] - a folder a paper, behind two traits: [`models::Task`] and [`models::Generator`].
+//! - [`training`] - the loop over a task's steps; it names no paper.
+//! - [`run`] - a run's folder: checkpoints, manifest, log, lock.
+//! - [`experiment`] - configs in layers, rows, whole tables reproduced.
+//! - [`evaluation`] - metrics, scores, a file a protocol, tables.
+//! - [`synthesis`] - what a model gives becomes motion that can be played.
+//! - [`report`] - charts, the motion viewer, the figures of papers.
+//! - [`cli`] - the subcommands of the binary: arguments and printing only.
+//!
+//! > Training knows steps. A paper knows its data. A protocol knows scores. A request knows what is
+//! > given.
 #![deny(unsafe_code)]
 // They panic where the output is closed: writeln! with its error to stdout, cli::notice to stderr.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

@@ -93,7 +93,7 @@ fn expected(shapes: &[(&str, &[usize])]) -> Shapes {
     shapes.iter().map(copy).collect()
 }
 
-/// The names and shapes that docs/model.md states.
+/// The names and shapes that docs/pan2021.md states.
 fn documented() -> Shapes {
     let mut all = Shapes::new();
     let mut linear = |name: &str, inputs: usize, outputs: usize| {

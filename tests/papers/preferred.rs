@@ -20,7 +20,7 @@ use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
 use crate::network::{Built, build, predict, residual, with_control_path};
 
 /// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least
-/// expected square error, where numbers d frames apart correlate by r(d) of `docs/model.md`.
+/// expected square error, where numbers d frames apart correlate by r(d) of `docs/pan2021.md`.
 fn estimate(t: usize, n: usize) -> [f64; 3] {
     kriging(t, n).0
 }
