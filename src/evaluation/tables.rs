@@ -8,7 +8,7 @@ use super::{Metric, PrintedRow, PrintedTables};
 /// One of our models in the tables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableRow {
-    /// The model's name in its config, such as `whole_model`; finds the paper's row.
+    /// The model's name in its config, such as `one_layer`; finds the paper's row.
     pub name: String,
     /// The seed of its training. Rows that differ in it only are shown with their mean and spread.
     pub seed: Option<u64>,

@@ -85,9 +85,10 @@ pub fn write(
     let text = tables.markdown(&table_rows, &record.data.caption());
     let mut files: Vec<PathBuf> = vec![out.join(TABLES)];
     replace_file(&files[0], text.as_bytes())?;
-    if let Some(metric) = protocol.metrics().first() {
+    if let Some(metric) = protocol.metrics().first()
+        && let Some(drawn) = score_figure(metric, printed, &table_rows)?
+    {
         let figure = out.join(metric.key).with_extension("svg");
-        let drawn = score_figure(metric, printed, &table_rows)?;
         replace_file(&figure, drawn.as_bytes())?;
         files.push(figure);
     }

@@ -66,15 +66,21 @@ pub(super) fn metric_axis(metric: &Metric) -> String {
 /// The figure of the rows' scores on test clips, SVG: the mean over a model's seeds, and of the rows that the paper's file names
 /// the printed ones.
 ///
+/// None where no column is a number that scores could be drawn over.
+///
 /// # Errors
-/// There is nothing to draw.
+/// A score is not finite.
 pub fn score_figure(
     metric: &Metric,
     printed: &PrintedTables,
     rows: &[TableRow],
-) -> Result<String, FigureError> {
+) -> Result<Option<String>, FigureError> {
     let title = format!("{} on the test clips; dashed: the paper's", metric.title);
-    score_curve(&title, metric, &series(metric, printed, rows))
+    let series = series(metric, printed, rows);
+    match series.iter().all(|series| series.ours.is_empty()) {
+        true => Ok(None),
+        false => score_curve(&title, metric, &series).map(Some),
+    }
 }
 
 fn series(metric: &Metric, printed: &PrintedTables, rows: &[TableRow]) -> Vec<ScoreSeries> {

@@ -140,7 +140,7 @@ fn every_config_becomes_a_row_with_scores_curves_and_a_manifest_of_all() {
     for words in [
         "One LSTM (seed 1), Whole model (seed 1): ",
         &format!("({:.3} % of the whole", 100.0 * done as f64 / whole as f64),
-        "schedule.fraction 0.05, batch size 8, learning rate 0.0001 (0.00005 for Transformers)",
+        "schedule.fraction 0.05, batch size 8, learning rate 0.0001 (0.00005 for transformers)",
         manifest["data_digest"].as_str().unwrap(),
     ] {
         assert!(tables.contains(words), "{words}: {tables}");

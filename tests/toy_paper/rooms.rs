@@ -69,5 +69,9 @@ fn with_every_papers_folder_taken_out_the_toy_paper_still_passes() {
         .output()
         .unwrap();
     let text = [output.stdout, output.stderr].concat();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&text));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&text)
+    );
 }

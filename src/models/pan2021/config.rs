@@ -186,13 +186,13 @@ impl Pan2021Config {
             !self.control_path || self.output == Output::Residual,
             "control_path",
             &self.control_path,
-            "false, or model.output = \"residual\": it corrects an estimate",
+            "model.output = \"residual\" with it: it corrects an estimate",
         )?;
         require(
             !self.velocity_refinement || self.velocity_factor,
             "velocity_refinement",
             &self.velocity_refinement,
-            "false, or model.velocity_factor = true: it asks for velocity factors",
+            "model.velocity_factor = true with it: it asks for velocity factors",
         )?;
         require(
             !self.window.is_multiple_of(2) && self.window <= 1001,
