@@ -438,3 +438,27 @@ fn names_and_seeds_that_no_config_has_are_errors_that_list_those_there_are() {
         .failure()
         .stderr(contains("holds no config"));
 }
+
+#[test]
+fn a_key_of_one_model_reaches_only_the_rows_that_know_it() {
+    let place = TempDir::new().unwrap();
+    let set = ["--set", "model.loss.key=0", "--only"];
+    reproduce(place.path())
+        .args(set)
+        .arg("one_lstm")
+        .assert()
+        .success();
+    let loss = |row: &str| {
+        let config = fs::read_to_string(place.path().join("results").join(row).join("config.toml"));
+        let config: toml::Table = config.unwrap().parse().unwrap();
+        config["model"]["loss"]["key"].as_float()
+    };
+    assert_eq!(loss("one_lstm"), Some(0.0));
+    // A row that is asked for and has no such key is refused with it.
+    reproduce(place.path())
+        .args(set)
+        .arg("interpolation")
+        .assert()
+        .failure()
+        .stderr(contains("--set model.loss.key=0").and(contains("interpolation.toml")));
+}
