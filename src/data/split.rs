@@ -17,7 +17,8 @@ pub(super) struct Parts {
     pub test: Vec<String>,
 }
 
-/// Splits clips, given by name and sorted bytewise; `origin` is what errors call where they come from.
+/// Splits clips, given by name and sorted bytewise; `origin` is what errors call where they come
+/// from.
 pub(super) fn split(
     names: &[String],
     origin: &str,
@@ -117,7 +118,8 @@ fn dancer_of(name: &str) -> &str {
     name.split('_').next().unwrap_or(name)
 }
 
-/// The rule that gives the paper's training frames: number the sorted names from 1, sort `"{number}_{name}"` bytewise, the first `count` train.
+/// The rule that gives the paper's training frames: number the sorted names from 1, sort
+/// `"{number}_{name}"` bytewise, the first `count` train.
 fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
     let mut numbered: Vec<(String, &String)> = names
         .iter()
@@ -130,7 +132,8 @@ fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
     (train, test)
 }
 
-/// Takes a share of the training clips for validation, evenly spread over them: neighbours are often the same dancer's.
+/// Takes a share of the training clips for validation, evenly spread over them: neighbours are
+/// often the same dancer's.
 fn set_aside(clips: Vec<String>, share: f64) -> (Vec<String>, Vec<String>) {
     let (validation, train): (Vec<_>, Vec<_>) = clips
         .into_iter()

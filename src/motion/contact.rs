@@ -5,7 +5,8 @@ use ndarray::ArrayView1;
 
 use super::features::CONTACTS;
 
-/// The foot joints of the dance skeleton, in the order of the labels: LeftFoot, LeftToeBase, RightFoot, RightToeBase.
+/// The foot joints of the dance skeleton, in the order of the labels: LeftFoot, LeftToeBase,
+/// RightFoot, RightToeBase.
 pub const FOOT_JOINTS: [usize; 4] = [3, 4, 7, 8];
 
 /// A foot joint is in contact where its label is above this.
@@ -13,15 +14,18 @@ pub const CONTACT_LABEL: f64 = 0.5;
 
 /// Which foot joints are in contact by the labels of a frame, in the order of [`FOOT_JOINTS`].
 ///
-/// `frame`: the 149 numbers of a predicted frame or the 154 of a recorded one, not standardised. Panics on fewer than 77 numbers.
+/// `frame`: the 149 numbers of a predicted frame or the 154 of a recorded one, not standardised.
+/// Panics on fewer than 77 numbers.
 pub fn in_contact(frame: ArrayView1<f64>) -> [bool; 4] {
     std::array::from_fn(|foot| frame[CONTACTS.start + foot] > CONTACT_LABEL)
 }
 
-/// Contact labels of every frame, `[frames][4]`: 1 where the squared world-space speed is below `threshold` ((cm/frame)^2).
+/// Contact labels of every frame, `[frames][4]`: 1 where the squared world-space speed is below
+/// `threshold` ((cm/frame)^2).
 ///
-/// The speed of frame t is that from t - 1 to t; the first frame has the labels of the second, and a clip of one frame
-/// counts as standing. World space, because relative to the root a planted foot of a moving dancer looks like a moving one.
+/// The speed of frame t is that from t - 1 to t; the first frame has the labels of the second, and
+/// a clip of one frame counts as standing. World space, because relative to the root a planted foot
+/// of a moving dancer looks like a moving one.
 pub fn contacts(world: &[Vec<DVec3>], threshold: f64) -> Vec<[f64; 4]> {
     let mut labels: Vec<[f64; 4]> = world
         .windows(2)
@@ -36,10 +40,11 @@ pub fn contacts(world: &[Vec<DVec3>], threshold: f64) -> Vec<[f64; 4]> {
     labels
 }
 
-/// Foot skate: the mean distance (cm/frame) that a foot joint moves in the world from the frame before to one in which it is in contact. None
-/// where no joint is.
+/// Foot skate: the mean distance (cm/frame) that a foot joint moves in the world from the frame
+/// before to one in which it is in contact. None where no joint is.
 ///
-/// `world`: world positions of the dance skeleton's joints, `[frames][24]`, cm; `contacts`: `[frames]` in the order of [`FOOT_JOINTS`].
+/// `world`: world positions of the dance skeleton's joints, `[frames][24]`, cm; `contacts`:
+/// `[frames]` in the order of [`FOOT_JOINTS`].
 pub fn foot_skate(world: &[Vec<DVec3>], contacts: &[[bool; 4]]) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for (pair, contacts) in world.windows(2).zip(contacts.iter().skip(1)) {

@@ -18,10 +18,11 @@ pub struct TwoBone {
 
 /// Places the middle joint of a limb so that its end meets `target`.
 ///
-/// `root` (hip or shoulder) and `target` are positions in cm; `upper` and `lower` are the bone lengths, cm; the middle
-/// joint bends towards `pole`, a direction of any length. The bone lengths are held whatever the target: out of reach, the limb
-/// points at the target as far (or as near) as it goes. With a pole along the limb, or a target on the root, any bend that
-/// holds the lengths is returned.
+/// `root` (hip or shoulder) and `target` are positions in cm; `upper` and `lower` are the bone
+/// lengths, cm; the middle joint bends towards `pole`, a direction of any length. The bone lengths
+/// are held whatever the target: out of reach, the limb points at the target as far (or as near) as
+/// it goes. With a pole along the limb, or a target on the root, any bend that holds the lengths is
+/// returned.
 pub fn two_bone(root: DVec3, target: DVec3, upper: f64, lower: f64, pole: DVec3) -> TwoBone {
     let offset = target - root;
     let length = offset.length();
@@ -55,7 +56,8 @@ pub fn two_bone(root: DVec3, target: DVec3, upper: f64, lower: f64, pole: DVec3)
     }
 }
 
-/// The rotation that takes the direction `rest` to `direction`, and `rest_pole` as near to `pole` as that allows.
+/// The rotation that takes the direction `rest` to `direction`, and `rest_pole` as near to `pole`
+/// as that allows.
 ///
 /// Directions of any length; where a pole is along its direction, any perpendicular one stands in.
 pub fn aim(rest: DVec3, rest_pole: DVec3, direction: DVec3, pole: DVec3) -> DQuat {

@@ -4,11 +4,13 @@ use thiserror::Error;
 
 use super::clip::{Clip, Pose};
 
-/// Files round their frame times (0.0333333, 0.00833333): a ratio of rates this close to a whole number is that number.
+/// Files round their frame times (0.0333333, 0.00833333): a ratio of rates this close to a whole
+/// number is that number.
 const ROUNDING: f64 = 1e-4;
 /// How many new frames one old frame may become.
 const FINEST: f64 = 120.0;
-/// Most frames (over two hours at 30 a second) that a clip may be refined to: a small file of few frames a second would fill memory.
+/// Most frames (over two hours at 30 a second) that a clip may be refined to: a small file of few
+/// frames a second would fill memory.
 const MOST_FRAMES: usize = 250_000;
 
 /// Why a clip cannot be resampled.
@@ -36,13 +38,16 @@ pub enum ResampleError {
     },
 }
 
-/// The clip at `fps` frames a second: rotations slerped, translations interpolated linearly, from the first frame on up to the last.
+/// The clip at `fps` frames a second: rotations slerped, translations interpolated linearly, from
+/// the first frame on up to the last.
 ///
-/// A clip whose frame time rounds 1 / `fps` (0.0333333 s for 30 fps) is returned as it is; where old and new rate are whole multiples of each
-/// other up to such rounding, they are taken to be so exactly.
+/// A clip whose frame time rounds 1 / `fps` (0.0333333 s for 30 fps) is returned as it is; where
+/// old and new rate are whole multiples of each other up to such rounding, they are taken to be so
+/// exactly.
 ///
 /// # Errors
-/// `fps` is not a positive number, or a frame of the clip would become more than 120 or the clip more than 250,000.
+/// `fps` is not a positive number, or a frame of the clip would become more than 120 or the clip
+/// more than 250,000.
 pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
     if !(fps.is_finite() && fps > 0.0) {
         return Err(ResampleError::Rate { fps });

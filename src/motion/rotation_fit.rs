@@ -4,8 +4,9 @@ use glam::{DQuat, DVec3};
 
 /// The rotation R with the least sum of `|R a - b|^2` over pairs (a, b); none for no pairs.
 ///
-/// One pair: the shortest arc from a to b. More: Horn's method, the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix
-/// of the pairs' products, found by Jacobi rotations. Where several rotations are equally good (all pairs on one line) it is one of them.
+/// One pair: the shortest arc from a to b. More: Horn's method, the eigenvector of the largest
+/// eigenvalue of a symmetric 4 x 4 matrix of the pairs' products, found by Jacobi rotations. Where
+/// several rotations are equally good (all pairs on one line) it is one of them.
 pub fn best_rotation(pairs: &[(DVec3, DVec3)]) -> DQuat {
     match pairs {
         [] => DQuat::IDENTITY,
@@ -14,7 +15,8 @@ pub fn best_rotation(pairs: &[(DVec3, DVec3)]) -> DQuat {
     }
 }
 
-/// Horn 1987, "Closed-form solution of absolute orientation using unit quaternions", without translation and scale.
+/// Horn 1987, "Closed-form solution of absolute orientation using unit quaternions", without
+/// translation and scale.
 fn horn(pairs: &[(DVec3, DVec3)]) -> DQuat {
     let sum =
         |row: usize, column: usize| -> f64 { pairs.iter().map(|(a, b)| a[row] * b[column]).sum() };

@@ -27,8 +27,8 @@ const CHUNK: usize = 1 << 14;
 pub struct AdamConfig {
     /// The rate, or where it has a schedule the highest.
     pub learning_rate: f64,
-    /// Rates of their own of groups of weights that the model names, such as `{ encoder = 1e-4 }`; others have
-    /// `learning_rate`. They follow the same schedule.
+    /// Rates of their own of groups of weights that the model names, such as `{ encoder = 1e-4 }`;
+    /// others have `learning_rate`. They follow the same schedule.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub rates: BTreeMap<String, f64>,
     /// Decay of the mean of gradients.
@@ -110,8 +110,8 @@ struct Factors<T> {
 }
 
 impl<T: Real> Adam<T> {
-    /// Moments of zero for every parameter. `rate_group` says of a parameter's name which of [`AdamConfig::rates`] is its
-    /// own.
+    /// Moments of zero for every parameter. `rate_group` says of a parameter's name which of
+    /// [`AdamConfig::rates`] is its own.
     pub fn new<'g>(
         config: AdamConfig,
         parameters: &Parameters<T>,

@@ -31,7 +31,8 @@ impl Response {
     pub fn mean(responses: impl IntoIterator<Item = Self>) -> Self {
         let (mut sum, mut count) = ([0.0; 2], 0.0);
         for Self { asked, measured } in responses {
-            // Asked-for changes may have either sign; what counts is how far the answer goes their way.
+            // Asked-for changes may have either sign; what counts is how far the answer goes their
+            // way.
             sum[0] += asked.abs();
             sum[1] += measured * asked.signum();
             count += 1.0;
@@ -45,8 +46,9 @@ impl Response {
 
 /// How far the root goes along with a changed trajectory, cm.
 ///
-/// Asked for: the mean distance between the two target trajectories, `[F, 3]`. Measured: the mean over frames of the difference between the two generated
-/// motions' roots, in the direction of the difference between the targets. `frames`: `[F, 149 or 154]`.
+/// Asked for: the mean distance between the two target trajectories, `[F, 3]`. Measured: the mean
+/// over frames of the difference between the two generated motions' roots, in the direction of the
+/// difference between the targets. `frames`: `[F, 149 or 154]`.
 pub fn root_response(
     changed: (ArrayView2<f64>, ArrayView2<f64>),
     plain: (ArrayView2<f64>, ArrayView2<f64>),
@@ -68,9 +70,11 @@ pub fn root_response(
     Response { asked, measured }
 }
 
-/// Mean distance between the joints of two motions relative to the root (p^b of 23 joints), cm, over their generated frames.
+/// Mean distance between the joints of two motions relative to the root (p^b of 23 joints), cm,
+/// over their generated frames.
 ///
-/// Frame k of N is compared with the frame at the same share of the other motion's length. Row 0 of each is the keyframe and does not count.
+/// Frame k of N is compared with the frame at the same share of the other motion's length. Row 0 of
+/// each is the keyframe and does not count.
 pub fn body_distance(a: ArrayView2<f64>, b: ArrayView2<f64>) -> f64 {
     let (length, other) = (a.nrows() - 1, b.nrows() - 1);
     let of_frame = |frame: usize| {
@@ -91,7 +95,8 @@ fn joint_distance(a: ArrayView1<f64>, b: ArrayView1<f64>) -> f64 {
     joints.map(distance).sum::<f64>() / count
 }
 
-/// Mean over the generated frames of the velocity factors measured on positions, `[5]`, cm/frame. Row 0 is the keyframe.
+/// Mean over the generated frames of the velocity factors measured on positions, `[5]`, cm/frame.
+/// Row 0 is the keyframe.
 pub fn mean_velocity_factors(frames: ArrayView2<f64>) -> [f64; PARTS] {
     mean_rows(&measured_velocity_factors(frames)[1..])
 }
@@ -107,7 +112,8 @@ mod tests {
     use crate::motion::features::FRAME;
     use ndarray::Array2;
 
-    /// A motion whose joints all go along x by `body` and whose root goes along z by `root`, cm/frame.
+    /// A motion whose joints all go along x by `body` and whose root goes along z by `root`,
+    /// cm/frame.
     fn moving(frames: usize, body: f64, root: f64) -> Array2<f64> {
         Array2::from_shape_fn((frames, FRAME), |(frame, column)| {
             let time = frame as f64;

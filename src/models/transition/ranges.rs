@@ -14,7 +14,8 @@ const SHARE: f64 = 0.999;
 /// Standard deviations from the mean that stand for the bounds where no clips are at hand.
 const DEVIATIONS: f64 = 5.0;
 
-/// Bounds of the controls over the frames of the training clips: 99.9 % of the frames lie below a highest value and 99.9 % above a lowest.
+/// Bounds of the controls over the frames of the training clips: 99.9 % of the frames lie below a
+/// highest value and 99.9 % above a lowest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DataRanges {
@@ -44,7 +45,8 @@ impl DataRanges {
         Ok(Some(Self::from_statistics(&statistics)))
     }
 
-    /// Bounds over the frames of these clips, each `[frames, 154]`, not standardised. None for no frames.
+    /// Bounds over the frames of these clips, each `[frames, 154]`, not standardised. None for no
+    /// frames.
     pub fn of<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Option<Self> {
         let column = |number: usize| -> Vec<f64> {
             let clips = clips.clone().into_iter();
@@ -116,7 +118,8 @@ mod tests {
     use crate::motion::features::FEATURES;
     use ndarray::Array2;
 
-    /// 2000 frames with the root at 80 + frame / 100 cm, moving at 5 cm/frame, in one of them at 900.
+    /// 2000 frames with the root at 80 + frame / 100 cm, moving at 5 cm/frame, in one of them at
+    /// 900.
     fn clip() -> Array2<f64> {
         let mut clip = Array2::zeros((2000, FEATURES));
         for (frame, mut row) in clip.rows_mut().into_iter().enumerate() {

@@ -15,9 +15,11 @@ pub enum RootFrame {
     /// The clip's own, as in the paper.
     #[default]
     World,
-    /// From the place of keyframe k1 on the floor: the same motion elsewhere is the same to a network.
+    /// From the place of keyframe k1 on the floor: the same motion elsewhere is the same to a
+    /// network.
     Keyframe,
-    /// From there, and turned so that k1 faces +Z: the same motion in another direction is the same, too.
+    /// From there, and turned so that k1 faces +Z: the same motion in another direction is the
+    /// same, too.
     KeyframeFacing,
 }
 
@@ -33,7 +35,8 @@ pub struct WindowFrame {
 }
 
 impl RootFrame {
-    /// The frame of a window whose keyframe k1 has these features, `[149]` or more, not standardised.
+    /// The frame of a window whose keyframe k1 has these features, `[149]` or more, not
+    /// standardised.
     pub fn of_window(self, first: ArrayView1<f64>) -> WindowFrame {
         let facing = first[FACING.start];
         let place = [
@@ -86,9 +89,11 @@ impl RootFrame {
 
     /// Statistics over training clips, each `[frames, 154]`, as windows show them in this frame.
     ///
-    /// For [`RootFrame::World`] those of [`Standardisation::fit`]. In the others, mean and deviation of p^r on the floor (x and z), and
-    /// where k1 faces +Z of o^r and of v^r on the floor too, are those of frames k1 + 1 .. k2 of all windows of `transition`
-    /// frames, which start as [`windows`] says; all others, and the height, are those of the frames of the clips as ever.
+    /// For [`RootFrame::World`] those of [`Standardisation::fit`]. In the others, mean and
+    /// deviation of p^r on the floor (x and z), and where k1 faces +Z of o^r and of v^r on the
+    /// floor too, are those of frames k1 + 1 .. k2 of all windows of `transition` frames, which
+    /// start as [`windows`] says; all others, and the height, are those of the frames of the clips
+    /// as ever.
     pub fn standardisation<'a>(
         self,
         clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone,
@@ -123,7 +128,8 @@ impl RootFrame {
 }
 
 impl WindowFrame {
-    /// From the clip's frame into this one: p^r, o^r and v^r of a frame's numbers, `[149]` or more, not standardised.
+    /// From the clip's frame into this one: p^r, o^r and v^r of a frame's numbers, `[149]` or more,
+    /// not standardised.
     pub fn enter(&self, mut frame: ArrayViewMut1<f64>) {
         for (column, origin) in ROOT_POSITION.zip(self.origin) {
             frame[column] -= origin;

@@ -44,8 +44,9 @@ pub struct Schedule {
 impl Schedule {
     /// Counts the schedule for training clips of these numbers of frames.
     ///
-    /// With a `fraction` below 1 whole batches are dealt: the windows due of a length that fill none go to the next length, so that a
-    /// small share has steps of `batch_size` windows as any other, and the total is right to one batch.
+    /// With a `fraction` below 1 whole batches are dealt: the windows due of a length that fill
+    /// none go to the next length, so that a small share has steps of `batch_size` windows as any
+    /// other, and the total is right to one batch.
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
         let mut schedule = Self {
             clip_frames: clip_frames.to_vec(),
@@ -132,7 +133,8 @@ impl Schedule {
         &self.skipped_lengths
     }
 
-    /// Epoch and position in it of the step that `steps_done` steps come before; the number of epochs and 0 at the end.
+    /// Epoch and position in it of the step that `steps_done` steps come before; the number of
+    /// epochs and 0 at the end.
     pub fn place(&self, steps_done: u64) -> (usize, usize) {
         let epoch = self.first_steps[1..].partition_point(|&end| end <= steps_done);
         let first = self.first_steps[epoch.min(self.epochs.len())];
@@ -141,8 +143,8 @@ impl Schedule {
 
     /// The batches of an epoch, in the order in which they are trained; none beyond the last epoch.
     ///
-    /// A length's windows are dealt to as few batches as hold them, as evenly as possible: a rest of one window would be a step as
-    /// large as any, in a direction that one window gives.
+    /// A length's windows are dealt to as few batches as hold them, as evenly as possible: a rest
+    /// of one window would be a step as large as any, in a direction that one window gives.
     pub fn epoch(&self, epoch: usize) -> Vec<BatchPlan> {
         let mut rng = self.streams.stream("shuffling", &[epoch as u64]);
         let mut batches = Vec::new();
@@ -160,11 +162,12 @@ impl Schedule {
         batches
     }
 
-    /// beta, the probability that the ground truth is fed at a step (counted from 0): `decay^(step r)`, where r is the number of
-    /// steps of the whole schedule, with all windows in batches of 128, over the number of steps of this one.
+    /// beta, the probability that the ground truth is fed at a step (counted from 0):
+    /// `decay^(step r)`, where r is the number of steps of the whole schedule, with all windows in
+    /// batches of 128, over the number of steps of this one.
     ///
-    /// So a fraction of the schedule is that fraction of all of it: beta falls as far in its fewer steps. With fraction 1 and
-    /// batches of 128 it is the paper's `decay^step`.
+    /// So a fraction of the schedule is that fraction of all of it: beta falls as far in its fewer
+    /// steps. With fraction 1 and batches of 128 it is the paper's `decay^step`.
     pub fn teacher_forcing(&self, config: &ScheduledSamplingConfig, step: u64) -> f64 {
         let stretch = self.reference_steps as f64 / self.steps().max(1) as f64;
         config.decay.powf(step as f64 * stretch)

@@ -8,7 +8,8 @@ use crate::motion::features::FACING;
 
 /// Features of the window that starts at frame `start`, `[transition + 1, 154]`, not standardised.
 ///
-/// The facing angle is shifted by a multiple of 2 pi so that the first frame's lies in [-pi, pi). The window must lie in the clip.
+/// The facing angle is shifted by a multiple of 2 pi so that the first frame's lies in [-pi, pi).
+/// The window must lie in the clip.
 pub fn window_features(clip: &Array2<f64>, start: usize, transition: usize) -> Array2<f64> {
     let mut window = clip.slice(s![start..=start + transition, ..]).to_owned();
     let mut facing = window.column_mut(FACING.start);

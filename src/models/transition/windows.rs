@@ -18,7 +18,8 @@ pub struct Windows {
     pub skipped: Vec<usize>,
 }
 
-/// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every ceil(0.1 (N + 1)) frames.
+/// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every
+/// ceil(0.1 (N + 1)) frames.
 pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
     let length = transition + 1;
     let stride = length.div_ceil(10);
