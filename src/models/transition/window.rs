@@ -26,31 +26,3 @@ pub fn wrap(angle: f64) -> f64 {
     // Just below a full turn the remainder rounds up to the turn itself.
     if wrapped < PI { wrapped } else { -PI }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    #[test]
-    fn angles_at_the_edges_are_wrapped_into_the_half_open_range() {
-        for angle in [PI, -PI, 3.0 * PI, -1e-17 - PI, PI - 1e-17, 1e9, -1e9] {
-            let wrapped = wrap(angle);
-            assert!((-PI..PI).contains(&wrapped), "{angle} became {wrapped}");
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn a_window_keeps_its_turning_and_starts_in_range(angles in prop::collection::vec(-100.0..100.0f64, 8), start in 0usize..4) {
-            let mut clip = Array2::zeros((8, 154));
-            clip.column_mut(FACING.start).assign(&ndarray::Array1::from(angles.clone()));
-            let window = window_features(&clip, start, 4);
-            prop_assert!((-PI..PI).contains(&window[[0, FACING.start]]));
-            for time in 1..=4 {
-                let turned = window[[time, FACING.start]] - window[[0, FACING.start]];
-                prop_assert!((turned - (angles[start + time] - angles[start])).abs() < 1e-9);
-            }
-        }
-    }
-}
