@@ -38,8 +38,8 @@ struct Block<T> {
     packed_transposed: OnceLock<Packed<T>>,
 }
 
-/// Named weights, and named buffers: state that is saved with them and that no gradient moves, such as running means. Shared
-/// read-only by the tapes of a step; changed between steps only.
+/// Named weights, and named buffers: state that is saved with them and that no gradient moves, such
+/// as running means. Shared read-only by the tapes of a step; changed between steps only.
 #[derive(Debug, Clone, Default)]
 pub struct Parameters<T> {
     parameters: Vec<Parameter<T>>,

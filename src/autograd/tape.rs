@@ -347,7 +347,8 @@ impl<'a, T: Real> Tape<'a, T> {
         }
     }
 
-    /// The values of a buffer, such as a running mean; on the tape they are a constant like any other.
+    /// The values of a buffer, such as a running mean; on the tape they are a constant like any
+    /// other.
     pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
         self.parameters.buffer(id)
     }

@@ -58,10 +58,12 @@ impl DataConfig {
 pub enum Split {
     /// The paper's split of its 123 dance clips: 98 train, 25 test; both frame counts are checked.
     Dance,
-    /// The dance split's training clips alone: those of these dancers test, those of the others train. For choices that are to hold for dancers whom
-    /// the model does not know, without a look at the test clips. A clip shows the dancer whose name stands before its first "_".
+    /// The dance split's training clips alone: those of these dancers test, those of the others
+    /// train. For choices that are to hold for dancers whom the model does not know, without a look
+    /// at the test clips. A clip shows the dancer whose name stands before its first "_".
     UnseenDancers(Vec<String>),
-    /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest tests.
+    /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest
+    /// tests.
     Share(f64),
     /// Named files; files of the folder that neither list names are left out.
     List {

@@ -28,7 +28,8 @@ pub struct Dataset {
     pub validation: Vec<Recording>,
     pub test: Vec<Recording>,
     /// SHA-256 over the files' names and bytes, hexadecimal: what
-    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over names and poses.
+    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over
+    /// names and poses.
     pub digest: String,
 }
 
@@ -120,10 +121,12 @@ impl Dataset {
         })
     }
 
-    /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as files.
+    /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as
+    /// files.
     ///
     /// # Errors
-    /// Two clips of one name, a clip that cannot be measured, or a config that does not fit the clips.
+    /// Two clips of one name, a clip that cannot be measured, or a config that does not fit the
+    /// clips.
     pub fn from_clips(clips: Vec<Clip>, config: &DataConfig) -> Result<Self, DataError> {
         let mut by_name = BTreeMap::new();
         for clip in clips {
@@ -139,7 +142,8 @@ impl Dataset {
         })
     }
 
-    /// The parts of the split, each clip with the digest of what it was made from as `read` gives them.
+    /// The parts of the split, each clip with the digest of what it was made from as `read` gives
+    /// them.
     fn assemble(
         names: &[String],
         origin: &str,

@@ -17,7 +17,8 @@ pub(super) struct Parts {
     pub test: Vec<String>,
 }
 
-/// Splits clips, given by name and sorted bytewise; `origin` is what errors call where they come from.
+/// Splits clips, given by name and sorted bytewise; `origin` is what errors call where they come
+/// from.
 pub(super) fn split(
     names: &[String],
     origin: &str,
@@ -117,7 +118,8 @@ fn dancer_of(name: &str) -> &str {
     name.split('_').next().unwrap_or(name)
 }
 
-/// The rule that gives the paper's training frames: number the sorted names from 1, sort `"{number}_{name}"` bytewise, the first `count` train.
+/// The rule that gives the paper's training frames: number the sorted names from 1, sort
+/// `"{number}_{name}"` bytewise, the first `count` train.
 fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
     let mut numbered: Vec<(String, &String)> = names
         .iter()
@@ -130,7 +132,8 @@ fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
     (train, test)
 }
 
-/// Takes a share of the training clips for validation, evenly spread over them: neighbours are often the same dancer's.
+/// Takes a share of the training clips for validation, evenly spread over them: neighbours are
+/// often the same dancer's.
 fn set_aside(clips: Vec<String>, share: f64) -> (Vec<String>, Vec<String>) {
     let (validation, train): (Vec<_>, Vec<_>) = clips
         .into_iter()
@@ -171,121 +174,4 @@ pub(super) fn check_dance_frames(
         });
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn names(count: usize) -> Vec<String> {
-        (0..count)
-            .map(|index| format!("{}.bvh", char::from(b'a' + index as u8)))
-            .collect()
-    }
-
-    #[test]
-    fn clips_are_split_by_their_number_as_text() {
-        let config = DataConfig {
-            split: Split::Share(0.25),
-            ..DataConfig::default()
-        };
-        let parts = split(&names(12), "x", &config).unwrap();
-        assert_eq!(parts.train, ["j.bvh", "k.bvh", "l.bvh"]);
-        assert_eq!(parts.test[..2], ["a.bvh", "b.bvh"]);
-    }
-
-    #[test]
-    fn validation_clips_are_taken_from_the_training_clips_only() {
-        let plain = DataConfig {
-            split: Split::Share(0.5),
-            ..DataConfig::default()
-        };
-        let without = split(&names(20), "x", &plain).unwrap();
-        let with = split(
-            &names(20),
-            "x",
-            &DataConfig {
-                validation_share: 0.3,
-                ..plain
-            },
-        )
-        .unwrap();
-        assert_eq!(with.test, without.test);
-        assert_eq!(with.validation.len(), 3);
-        let mut rejoined = [with.train, with.validation].concat();
-        rejoined.sort_unstable();
-        let mut train = without.train;
-        train.sort_unstable();
-        assert_eq!(rejoined, train);
-    }
-
-    #[test]
-    fn unseen_dancers_are_tested_on_and_neither_trained_nor_mixed_with_the_test_clips() {
-        let names: Vec<String> = (0..123)
-            .map(|index| format!("{}_{index:03}.bvh", ["Eva", "Evan", "Ida"][index % 3]))
-            .collect();
-        let parts = |split_by: Split| {
-            let config = DataConfig {
-                split: split_by,
-                validation_share: 0.1,
-                ..DataConfig::default()
-            };
-            split(&names, "the data folder", &config)
-        };
-        let dance = parts(Split::Dance).unwrap();
-        let unseen = parts(Split::UnseenDancers(vec!["Eva".into()])).unwrap();
-        assert!(unseen.test.iter().all(|name| name.starts_with("Eva_")));
-        let mut all = [unseen.train.clone(), unseen.validation.clone()].concat();
-        assert!(all.iter().all(|name| !name.starts_with("Eva_")));
-        assert!(!unseen.validation.is_empty());
-        all.extend(unseen.test);
-        all.sort_unstable();
-        let mut training = [dance.train, dance.validation].concat();
-        training.sort_unstable();
-        assert_eq!(all, training);
-        let message = |dancers: &[&str]| {
-            let dancers = dancers.iter().map(|&dancer| dancer.into()).collect();
-            parts(Split::UnseenDancers(dancers))
-                .unwrap_err()
-                .to_string()
-        };
-        let text = message(&["Eva", "Ev"]);
-        assert!(
-            text.contains("show Ev,") && text.contains("the data folder"),
-            "{text}"
-        );
-        for dancers in [&[][..], &["Eva", "Evan", "Ida"]] {
-            assert!(message(dancers).contains("split.unseen_dancers"));
-        }
-    }
-
-    #[test]
-    fn a_split_that_does_not_fit_names_both_sides() {
-        let message = |split_by: Split, count: usize| {
-            let config = DataConfig {
-                split: split_by,
-                ..DataConfig::default()
-            };
-            split(&names(count), "the data folder", &config)
-                .unwrap_err()
-                .to_string()
-        };
-        let text = message(Split::Dance, 4);
-        assert!(
-            text.contains("123 clips") && text.contains("the data folder holds 4"),
-            "{text}"
-        );
-        let list = |train: &str, test: &str| Split::List {
-            train: vec![train.into()],
-            test: vec![test.into()],
-        };
-        let text = message(list("a.bvh", "z.bvh"), 4);
-        assert!(
-            text.contains("z.bvh") && text.contains("its 4 clips"),
-            "{text}"
-        );
-        assert!(message(list("a.bvh", "a.bvh"), 4).contains("a.bvh"));
-        assert!(message(Split::Share(0.5), 1).contains("none for training"));
-        assert!(message(Split::Share(f64::NAN), 4).contains("split.share"));
-    }
 }

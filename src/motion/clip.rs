@@ -7,8 +7,9 @@ use super::skeleton::Skeleton;
 /// The local transforms of all joints in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pose {
-    /// Translation of each joint in its parent's frame, `[joints]`, cm: the root's position in the world, the offset of a
-    /// joint without position channels, what the channels say of a joint that has them.
+    /// Translation of each joint in its parent's frame, `[joints]`, cm: the root's position in the
+    /// world, the offset of a joint without position channels, what the channels say of a joint
+    /// that has them.
     pub translations: Vec<DVec3>,
     /// Rotation of each joint in its parent's frame, `[joints]`.
     pub rotations: Vec<DQuat>,

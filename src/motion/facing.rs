@@ -11,9 +11,10 @@ const LEFT_ARM: usize = 19;
 
 /// Facing angle about Y of every frame, `[frames]`, rad: 0 looks along +Z, pi/2 along +X.
 ///
-/// `world` holds the world positions of the dance skeleton's joints, `[frames][24]`, cm. The forward direction is smoothed with a
-/// Gaussian of standard deviation `sigma` frames before its angle is taken. The first angle lies in (-pi, pi]; from there the angle
-/// is followed without jumps of 2 pi.
+/// `world` holds the world positions of the dance skeleton's joints, `[frames][24]`, cm. The
+/// forward direction is smoothed with a Gaussian of standard deviation `sigma` frames before its
+/// angle is taken. The first angle lies in (-pi, pi]; from there the angle is followed without
+/// jumps of 2 pi.
 pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (world.first(), world.last()) else {
         return Vec::new();
@@ -21,14 +22,17 @@ pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
     smooth_angles(world, [forward(first), forward(last)], sigma)
 }
 
-/// Facing angles of predicted frames between two keyframes whose own facing angles are known, `[N + 1]`, rad.
+/// Facing angles of predicted frames between two keyframes whose own facing angles are known,
+/// `[N + 1]`, rad.
 ///
-/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][24]`, cm; `start` and `target` are the
-/// facing angles of k1 and k2. [`facing_angles`] smooths over the frames before k1 and after k2 too; here those are not there, and
-/// the dancer is taken to face along `start` before k1 and along `target` after k2. What the smoothed angles of k1 and k2 then still
-/// differ from the known ones is taken off, at the keyframe whole and less from frame to frame, until nothing is left `sigma` frames
-/// (or N, where that is less) away. So the first angle is `start`, the last is `target` up to full turns, and in between the
-/// angles follow the frames' own bodies.
+/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][24]`,
+/// cm; `start` and `target` are the facing angles of k1 and k2. [`facing_angles`] smooths over the
+/// frames before k1 and after k2 too; here those are not there, and the dancer is taken to face
+/// along `start` before k1 and along `target` after k2. What the smoothed angles of k1 and k2 then
+/// still differ from the known ones is taken off, at the keyframe whole and less from frame to
+/// frame, until nothing is left `sigma` frames (or N, where that is less) away. So the first angle
+/// is `start`, the last is `target` up to full turns, and in between the angles follow the frames'
+/// own bodies.
 pub fn facing_angles_between(
     world: &[Vec<DVec3>],
     [start, target]: [f64; 2],
@@ -56,7 +60,8 @@ pub fn facing_angles_between(
         .collect()
 }
 
-/// Angles of the smoothed forward directions, unwrapped; `ends` are the directions before the first frame and after the last.
+/// Angles of the smoothed forward directions, unwrapped; `ends` are the directions before the first
+/// frame and after the last.
 fn smooth_angles(world: &[Vec<DVec3>], ends: [DVec2; 2], sigma: f64) -> Vec<f64> {
     let forward: Vec<DVec2> = world.iter().map(|positions| forward(positions)).collect();
     let mut angles: Vec<f64> = gaussian(&forward, ends, sigma)
@@ -67,7 +72,8 @@ fn smooth_angles(world: &[Vec<DVec3>], ends: [DVec2; 2], sigma: f64) -> Vec<f64>
     angles
 }
 
-/// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts less in the smoothing.
+/// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts less
+/// in the smoothing.
 fn forward(positions: &[DVec3]) -> DVec2 {
     let across =
         (positions[LEFT_HIP] - positions[RIGHT_HIP]) + (positions[LEFT_ARM] - positions[RIGHT_ARM]);
@@ -75,7 +81,8 @@ fn forward(positions: &[DVec3]) -> DVec2 {
     DVec2::new(forward.x, forward.z)
 }
 
-/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side; `before` and `after` stand beyond the ends.
+/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side; `before` and `after`
+/// stand beyond the ends.
 fn gaussian(values: &[DVec2], [before, after]: [DVec2; 2], sigma: f64) -> Vec<DVec2> {
     let radius = (4.0 * sigma + 0.5) as usize;
     let mut kernel: Vec<f64> = (0..=2 * radius)
@@ -117,7 +124,8 @@ mod tests {
 
     #[test]
     fn smoothing_agrees_with_scipy() {
-        // scipy.ndimage.gaussian_filter1d([0, 0, 1, 5, -2], 1.5, mode="nearest"), likewise [3, -1, 0, 0, 7]
+        // scipy.ndimage.gaussian_filter1d([0, 0, 1, 5, -2], 1.5, mode="nearest"), likewise [3, -1,
+        // 0, 0, 7]
         let expected_x = [0.27188328, 0.67025507, 1.02270121, 0.80875307, -0.09178544];
         let expected_z = [1.7469826, 1.14805353, 1.3275359, 2.59391143, 4.42102501];
         let values =

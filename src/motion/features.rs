@@ -80,8 +80,8 @@ pub enum FeatureError {
 
 /// Features of every frame of a clip on the dance skeleton, `[frames, 154]`, not standardised.
 ///
-/// Velocities are per-frame differences at the clip's own rate: bring a clip to 30 fps first. The first frame has velocity 0, and so
-/// velocity factors 0.
+/// Velocities are per-frame differences at the clip's own rate: bring a clip to 30 fps first. The
+/// first frame has velocity 0, and so velocity factors 0.
 ///
 /// # Errors
 /// The clip is on another skeleton or has no frames; a setting is not a positive number.
@@ -113,8 +113,8 @@ pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, Feat
     Ok(features)
 }
 
-/// Writes p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame, from the world positions of its 24 joints (cm) and its facing angle
-/// (rad). `frame`: 149 or 154 numbers; panics on fewer than 73.
+/// Writes p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame, from the world positions of its 24
+/// joints (cm) and its facing angle (rad). `frame`: 149 or 154 numbers; panics on fewer than 73.
 pub fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], facing: f64) {
     let root = positions[0];
     let turn = DQuat::from_rotation_y(-facing);
@@ -130,7 +130,8 @@ pub fn write_positions(frame: &mut ArrayViewMut1<f64>, positions: &[DVec3], faci
     frame[FACING.start] = facing;
 }
 
-/// Writes v^b and v^r of all rows but the first, as the differences of p^b and p^r. `rows`: frames in a row, `[frames, 149 or 154]`, cm.
+/// Writes v^b and v^r of all rows but the first, as the differences of p^b and p^r. `rows`: frames
+/// in a row, `[frames, 149 or 154]`, cm.
 pub fn write_velocities(rows: &mut Array2<f64>) {
     for row in 1..rows.nrows() {
         for (velocities, positions) in [

@@ -1,4 +1,5 @@
-//! From joint positions to joint rotations, bone lengths held: what a BVH file needs of a predicted motion.
+//! From joint positions to joint rotations, bone lengths held: what a BVH file needs of a predicted
+//! motion.
 
 use glam::{DQuat, DVec3};
 
@@ -8,9 +9,11 @@ use super::{Pose, Skeleton};
 /// Joint rotations for a motion that was given by positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RotationFit {
-    /// One pose a frame: the root where it was asked for, all other translations as in the start pose.
+    /// One pose a frame: the root where it was asked for, all other translations as in the start
+    /// pose.
     pub poses: Vec<Pose>,
-    /// Mean over frames and joints of the distance from the asked position to the one the pose has, cm.
+    /// Mean over frames and joints of the distance from the asked position to the one the pose has,
+    /// cm.
     pub mean_error: f64,
     /// The largest of these distances, cm.
     pub max_error: f64,
@@ -31,23 +34,31 @@ pub enum RotationFitError {
     NoFrames,
 }
 
-/// Finds rotations whose forward kinematics come near the given world positions, `positions[frame][joint]`, cm.
+/// Finds rotations whose forward kinematics come near the given world positions,
+/// `positions[frame][joint]`, cm.
 ///
-/// `start` is the pose of the frame before the first (the keyframe k1), `end`, where it is known, that of the last frame (the keyframe
-/// k2). Bone lengths are those of `start`, so positions whose bones are longer or shorter cannot be met; the fit's errors say by
-/// how much. From the root outwards each joint is turned from its local rotation in the frame before, under its parent's new rotation:
+/// `start` is the pose of the frame before the first (the keyframe k1), `end`, where it is known,
+/// that of the last frame (the keyframe k2). Bone lengths are those of `start`, so positions whose
+/// bones are longer or shorter cannot be met; the fit's errors say by how much. From the root
+/// outwards each joint is turned from its local rotation in the frame before, under its parent's
+/// new rotation:
 ///
 /// - with several children, so that the sum of squared distances to their positions is least;
-/// - with one child, by the shortest arc that points it at the child, and then about the bone by the twist below;
-/// - without children, on the way from its rotation in `start` to that in `end`; it keeps the former without an end.
+/// - with one child, by the shortest arc that points it at the child, and then about the bone by
+///   the twist below;
+/// - without children, on the way from its rotation in `start` to that in `end`; it keeps the
+///   former without an end.
 ///
 /// Positions do not tell the twist about a bone; neighbours and the two keyframes do:
 ///
-/// - above an elbow or an ankle, the plane of the bend stays where it is in the frame before and in the keyframes, the more the limb is
-///   bent (the knee's plane is of no use: most of the time the leg is too straight to have one);
-/// - in a chain that leads to a joint of several children (the spine), each joint takes its share of what that joint is turned;
-/// - elsewhere, and above elbows and ankles too, the twist comes nearer from frame to frame to the one on the way between the keyframes', and not
-///   at all where the bone points the other way from there.
+/// - above an elbow or an ankle, the plane of the bend stays where it is in the frame before and in
+///   the keyframes, the more the limb is bent (the knee's plane is of no use: most of the time the
+///   leg is too straight to have one);
+/// - in a chain that leads to a joint of several children (the spine), each joint takes its share
+///   of what that joint is turned;
+/// - elsewhere, and above elbows and ankles too, the twist comes nearer from frame to frame to the
+///   one on the way between the keyframes', and not at all where the bone points the other way from
+///   there.
 ///
 /// # Errors
 ///
@@ -144,7 +155,8 @@ enum Guide {
 #[derive(Debug, Clone, PartialEq)]
 enum Twist {
     Free,
-    /// The child bends in a plane; `end` is the child's child, `bend` where the keyframes bend it to, across the bone, in the joint's frame.
+    /// The child bends in a plane; `end` is the child's child, `bend` where the keyframes bend it
+    /// to, across the bone, in the joint's frame.
     Hinge {
         end: usize,
         bend: DVec3,
@@ -185,7 +197,8 @@ impl<'a> Fitter<'a> {
         }
     }
 
-    /// The pose near `wanted` that goes on from the pose `before`; `share` of the way to the end pose.
+    /// The pose near `wanted` that goes on from the pose `before`; `share` of the way to the end
+    /// pose.
     fn frame(&self, wanted: &[DVec3], before: &Pose, share: f64) -> Pose {
         let mut pose = before.clone();
         let mut positions = Vec::with_capacity(self.skeleton.len());
@@ -289,7 +302,8 @@ fn weighted(weight: f64, angle: f64) -> f64 {
     (weight * angle.sin()).atan2(1.0 + weight * angle.cos())
 }
 
-/// A rotation that takes `bone` to `direction`, turned about it towards the rotation `between` the keyframes.
+/// A rotation that takes `bone` to `direction`, turned about it towards the rotation `between` the
+/// keyframes.
 fn drift(rotation: DQuat, between: DQuat, bone: DVec3, direction: DVec3) -> DQuat {
     let near = 0.5 * (1.0 + (between * bone.normalize()).dot(direction));
     let turn = swing(between, bone, direction) * rotation.inverse();
@@ -313,7 +327,8 @@ fn slerp(from: DQuat, to: DQuat, share: f64) -> DQuat {
     from.slerp(to, share).normalize()
 }
 
-/// Bones to children as `rotation` has them, and as they are wanted; those without a length are left out.
+/// Bones to children as `rotation` has them, and as they are wanted; those without a length are
+/// left out.
 fn pairs(
     rotation: DQuat,
     pose: &Pose,
@@ -328,8 +343,8 @@ fn pairs(
         .collect()
 }
 
-/// How a pose bends a limb at `middle`: the direction to `end` across the bone to `middle`, in the frame of the joint above; as long as the sine of
-/// the bend.
+/// How a pose bends a limb at `middle`: the direction to `end` across the bone to `middle`, in the
+/// frame of the joint above; as long as the sine of the bend.
 fn bend_of(pose: &Pose, middle: usize, end: usize) -> DVec3 {
     let direction = (pose.rotations[middle] * pose.translations[end]).normalize_or_zero();
     across(direction, pose.translations[middle])

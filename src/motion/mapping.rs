@@ -1,10 +1,10 @@
 //! Mapping files: which joints of another skeleton stand for the 24 of the dance skeleton.
 //!
 //! ```toml
-//! scale = 2.54                                            # cm per unit of the file; 1 where left out
+//! scale = 2.54                                            # cm per unit; 1 where left out
 //! [joints]
 //! Hips = "hip"                                            # a joint
-//! LeftToeBase = "lFoot/End Site"                          # an End Site of a joint; the second is "lFoot/End Site 2"
+//! LeftToeBase = "lFoot/End Site"                          # an End Site, or "lFoot/End Site 2"
 //! Spine1 = { between = ["abdomen", "chest"], at = 0.5 }   # a point on the way from one to another
 //! ```
 
@@ -115,7 +115,8 @@ impl Mapping {
     /// Reads a mapping file.
     ///
     /// # Errors
-    /// The file cannot be read; it has unknown keys, joints that the dance skeleton lacks, or lacks one of its joints.
+    /// The file cannot be read; it has unknown keys, joints that the dance skeleton lacks, or lacks
+    /// one of its joints.
     pub fn read(path: &Path) -> Result<Self, MappingError> {
         let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read {
             path: path.into(),
@@ -187,8 +188,9 @@ impl Mapping {
 
     /// The clip on the dance skeleton, in cm.
     ///
-    /// Every joint has the world position and world rotation of what stands for it, in every frame; so a point between two joints moves in its
-    /// parent's frame, and the skeleton's offsets are those of the rest pose only.
+    /// Every joint has the world position and world rotation of what stands for it, in every frame;
+    /// so a point between two joints moves in its parent's frame, and the skeleton's offsets are
+    /// those of the rest pose only.
     ///
     /// # Errors
     /// The clip lacks a joint or End Site that the mapping names.
@@ -295,7 +297,8 @@ impl Mapping {
         }
     }
 
-    /// End Sites of a joint that ends a limb: those of the joint that stands for it, or one at the joint itself.
+    /// End Sites of a joint that ends a limb: those of the joint that stands for it, or one at the
+    /// joint itself.
     fn end_sites(&self, joint: usize, place: &Place, skeleton: &Skeleton) -> Vec<DVec3> {
         if DANCE_PARENTS.contains(&Some(joint)) {
             return Vec::new();

@@ -5,8 +5,8 @@ use glam::{DQuat, DVec3};
 use super::clip::{Clip, Pose};
 use super::skeleton::{Joint, Skeleton};
 
-/// A clip on the dance skeleton as it is seen in a mirror in the plane X = 0, the skeleton and what the joints are called included:
-/// LeftHand of the image moves as RightHand of the clip does.
+/// A clip on the dance skeleton as it is seen in a mirror in the plane X = 0, the skeleton and what
+/// the joints are called included: LeftHand of the image moves as RightHand of the clip does.
 pub fn mirror_image(clip: &Clip) -> Clip {
     let partners: Vec<usize> = (0..clip.skeleton.len())
         .map(|joint| partner(&clip.skeleton, joint))

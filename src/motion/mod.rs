@@ -1,4 +1,5 @@
-//! Motion without learning: skeletons, clips, BVH files, forward kinematics, the features of a frame.
+//! Motion without learning: skeletons, clips, BVH files, forward kinematics, the features of a
+//! frame.
 //!
 //! Units: centimetres, radians, seconds; Y is up. Computed in f64.
 

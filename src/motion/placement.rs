@@ -11,9 +11,11 @@ pub fn vector(row: ArrayView1<f64>) -> DVec3 {
     DVec3::new(row[0], row[1], row[2])
 }
 
-/// World positions of the 24 joints of a frame, cm: p^r for the root, `p^r + R_y(o^r) p^b` for the others.
+/// World positions of the 24 joints of a frame, cm: p^r for the root, `p^r + R_y(o^r) p^b` for the
+/// others.
 ///
-/// `frame`: the 149 numbers of a predicted frame or the 154 of a recorded one, not standardised. Panics on fewer than 73 numbers.
+/// `frame`: the 149 numbers of a predicted frame or the 154 of a recorded one, not standardised.
+/// Panics on fewer than 73 numbers.
 pub fn world_positions(frame: ArrayView1<f64>) -> [DVec3; JOINTS] {
     let vector_at = |column: usize| vector(frame.slice(s![column..column + 3]));
     let root = vector_at(ROOT_POSITION.start);

@@ -61,7 +61,8 @@ pub const DANCE_PARENTS: [Option<usize>; JOINTS] = [
     Some(22),
 ];
 
-/// One joint: its name, its parent (always earlier in the skeleton) and where it sits in the parent's frame at rest.
+/// One joint: its name, its parent (always earlier in the skeleton) and where it sits in the
+/// parent's frame at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     pub name: String,
@@ -97,7 +98,8 @@ impl Skeleton {
         self.difference_from_dance().is_none()
     }
 
-    /// The first place where this is not the dance skeleton: its index, what the dance skeleton has there, what this one has.
+    /// The first place where this is not the dance skeleton: its index, what the dance skeleton has
+    /// there, what this one has.
     pub fn difference_from_dance(&self) -> Option<(usize, String, String)> {
         (0..self.len().max(JOINTS)).find_map(|index| {
             let expected = DANCE_JOINTS

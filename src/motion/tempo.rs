@@ -3,7 +3,8 @@
 use super::clip::Clip;
 use super::resample::{ResampleError, resample};
 
-/// The same dance `tempo` times as fast, at the clip's own frame rate: 2.0 takes half as long. Poses between frames as in [`resample`].
+/// The same dance `tempo` times as fast, at the clip's own frame rate: 2.0 takes half as long.
+/// Poses between frames as in [`resample`].
 ///
 /// # Errors
 /// As [`resample`] at the clip's frame rate divided by `tempo`.

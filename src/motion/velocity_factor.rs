@@ -12,7 +12,8 @@ pub const PARTS: usize = 5;
 /// Names of the body parts, in the order of every velocity factor.
 pub const PART_NAMES: [&str; PARTS] = ["trunk", "left_leg", "right_leg", "right_arm", "left_arm"];
 
-/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by side in a frame.
+/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by
+/// side in a frame.
 const POSITIONS: Range<usize> = BODY_POSITIONS.start..FACING.start;
 
 /// Joint weights of each body part (figure 4): `(joint of the dance skeleton, weight)`.
@@ -35,9 +36,11 @@ pub const PART_WEIGHTS: [&[(usize, f64)]; PARTS] = [
     &[(18, 1.0), (19, 2.0), (20, 3.0), (21, 4.0)],
 ];
 
-/// Eq. 1: the weighted mean speed of each part's joints, `[5]`, in the unit of `velocities` (cm/frame).
+/// Eq. 1: the weighted mean speed of each part's joints, `[5]`, in the unit of `velocities`
+/// (cm/frame).
 ///
-/// `velocities` are v^b and v^r in one row, as they stand in a frame's features: joints 1..24, then the root.
+/// `velocities` are v^b and v^r in one row, as they stand in a frame's features: joints 1..24, then
+/// the root.
 pub fn velocity_factors(velocities: &[f64; 72]) -> [f64; PARTS] {
     PART_WEIGHTS.map(|part| {
         let weighted: f64 = part
@@ -48,9 +51,11 @@ pub fn velocity_factors(velocities: &[f64; 72]) -> [f64; PARTS] {
     })
 }
 
-/// Eq. 1 for the motion from one frame to the next, `[5]`, cm/frame: the velocities are the differences of p^b and p^r.
+/// Eq. 1 for the motion from one frame to the next, `[5]`, cm/frame: the velocities are the
+/// differences of p^b and p^r.
 ///
-/// `before`, `frame`: a frame's numbers, not standardised; the velocities among them are not looked at.
+/// `before`, `frame`: a frame's numbers, not standardised; the velocities among them are not looked
+/// at.
 pub fn velocity_factors_between(before: ArrayView1<f64>, frame: ArrayView1<f64>) -> [f64; PARTS] {
     velocity_factors(&std::array::from_fn(|number| {
         let column = POSITIONS.start + number;
@@ -60,8 +65,8 @@ pub fn velocity_factors_between(before: ArrayView1<f64>, frame: ArrayView1<f64>)
 
 /// The velocity factors of every frame as its positions give them, `[frames][5]`, cm/frame.
 ///
-/// `frames`: `[frames, 149 or 154]`, not standardised. The first frame, which none comes before, has those of the second; a
-/// single frame has 0.
+/// `frames`: `[frames, 149 or 154]`, not standardised. The first frame, which none comes before,
+/// has those of the second; a single frame has 0.
 pub fn measured_velocity_factors(frames: ArrayView2<f64>) -> Vec<[f64; PARTS]> {
     let pairs = frames
         .rows()
@@ -81,27 +86,4 @@ fn speed(velocities: &[f64; 72], joint: usize) -> f64 {
     let at = if joint == 0 { 69 } else { 3 * (joint - 1) };
     let [x, y, z] = [velocities[at], velocities[at + 1], velocities[at + 2]];
     (x * x + y * y + z * z).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_moving_joint_counts_with_its_share_of_the_weights() {
-        let mut velocities = [0.0; 72];
-        velocities[3 * (17 - 1)..3 * 17].copy_from_slice(&[3.0, 0.0, 4.0]);
-        velocities[69..].copy_from_slice(&[0.0, 9.0, 0.0]);
-        assert_eq!(velocity_factors(&velocities), [1.0, 0.0, 0.0, 2.0, 0.0]);
-    }
-
-    #[test]
-    fn every_joint_belongs_to_exactly_one_part() {
-        let mut joints: Vec<usize> = PART_WEIGHTS
-            .iter()
-            .flat_map(|part| part.iter().map(|&(joint, _)| joint))
-            .collect();
-        joints.sort_unstable();
-        assert_eq!(joints, (0..24).collect::<Vec<_>>());
-    }
 }

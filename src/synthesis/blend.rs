@@ -1,10 +1,11 @@
 //! A predicted transition is bent onto the keyframes at its ends.
 //!
-//! What the prediction misses is added as an offset that decays: at the start over the first frames after the pose that the transition
-//! starts from, so that neither place nor velocity jumps there; at the end over the last frames before the keyframe, so that
-//! the motion runs into it with the velocity that was predicted. Offsets are rotations of each joint, the root's place and the facing angle, so
-//! bones keep their lengths. The curve is the quintic of inertial blending (Bollo 2018): value and velocity given at one end; value,
-//! velocity and acceleration 0 at the other.
+//! What the prediction misses is added as an offset that decays: at the start over the first frames
+//! after the pose that the transition starts from, so that neither place nor velocity jumps there;
+//! at the end over the last frames before the keyframe, so that the motion runs into it with the
+//! velocity that was predicted. Offsets are rotations of each joint, the root's place and the
+//! facing angle, so bones keep their lengths. The curve is the quintic of inertial blending (Bollo
+//! 2018): value and velocity given at one end; value, velocity and acceleration 0 at the other.
 
 use std::f64::consts::TAU;
 
@@ -30,7 +31,8 @@ pub(super) struct Start<'a> {
     pub before: Option<(&'a Pose, f64)>,
 }
 
-/// Bends `track` so that it goes on from `start` and ends in `target`, whose facing angle is `target_facing` up to whole turns.
+/// Bends `track` so that it goes on from `start` and ends in `target`, whose facing angle is
+/// `target_facing` up to whole turns.
 pub(super) fn blend(track: &mut Track, start: &Start<'_>, target: &Pose, target_facing: f64) {
     let length = track.poses.len();
     let frames = BLEND.min(length);
@@ -155,7 +157,8 @@ impl Decay {
         }
     }
 
-    /// Shares of the value and of the velocity (per frame) at the start that are left after `frames` frames.
+    /// Shares of the value and of the velocity (per frame) at the start that are left after
+    /// `frames` frames.
     fn at(&self, frames: usize) -> [f64; 2] {
         let s = frames as f64 / self.frames;
         if s >= 1.0 {
@@ -179,7 +182,8 @@ fn rotation_vector(rotation: DQuat) -> DVec3 {
     rotation.to_scaled_axis()
 }
 
-/// Of the two rotation vectors of one turn (the short way and the long way about) the one nearer to `to`.
+/// Of the two rotation vectors of one turn (the short way and the long way about) the one nearer to
+/// `to`.
 fn nearest(turn: DVec3, to: DVec3) -> DVec3 {
     let angle = turn.length();
     if angle < 1e-9 {

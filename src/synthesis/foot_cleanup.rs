@@ -1,10 +1,12 @@
 //! Feet that stand still where contact is predicted.
 //!
-//! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact the joint is held at one place; before and after,
-//! the correction comes and goes along a smooth curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel
-//! and toe are both held. A run over a keyframe holds the joint where the keyframe has it; one over several keyframes is split between them; near
-//! a keyframe outside the run the correction fades. So no keyframe changes. A joint that is predicted to slide far in one contact is held at one
-//! place after another: it steps instead.
+//! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact
+//! the joint is held at one place; before and after, the correction comes and goes along a smooth
+//! curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel and toe are
+//! both held. A run over a keyframe holds the joint where the keyframe has it; one over several
+//! keyframes is split between them; near a keyframe outside the run the correction fades. So no
+//! keyframe changes. A joint that is predicted to slide far in one contact is held at one place
+//! after another: it steps instead.
 
 use glam::{DQuat, DVec3};
 
@@ -17,7 +19,8 @@ const EASE: usize = 6;
 const SHORTEST: usize = 3;
 /// Gaps in a contact up to this many frames are noise in the labels.
 const GAP: usize = 2;
-/// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held at another place from then on.
+/// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held
+/// at another place from then on.
 const HELD: f64 = 25.0;
 /// Corrections below this are none, cm.
 const STILL: f64 = 1e-9;
@@ -57,7 +60,8 @@ struct Hold {
     weight: Vec<f64>,
 }
 
-/// Pins the feet of `poses`, `[F]`, in the frames of `contacts`; frames in `keyframes` (ascending) keep their poses.
+/// Pins the feet of `poses`, `[F]`, in the frames of `contacts`; frames in `keyframes` (ascending)
+/// keep their poses.
 pub(super) fn pin_feet(
     skeleton: &Skeleton,
     poses: &mut [Pose],
@@ -96,7 +100,8 @@ pub(super) fn pin_feet(
     }
 }
 
-/// Runs of frames in contact, short gaps closed and short runs dropped, split between the keyframes that they hold.
+/// Runs of frames in contact, short gaps closed and short runs dropped, split between the keyframes
+/// that they hold.
 fn stands(on: &[bool], keyframes: &[usize]) -> Vec<Stand> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for frame in (0..on.len()).filter(|&frame| on[frame]) {
@@ -140,8 +145,8 @@ fn stands(on: &[bool], keyframes: &[usize]) -> Vec<Stand> {
     stands
 }
 
-/// A stand cut where the joint leaves its place; the place is the keyframe's, or that of the frame where it is held first. Between two pieces are the
-/// frames of a step.
+/// A stand cut where the joint leaves its place; the place is the keyframe's, or that of the frame
+/// where it is held first. Between two pieces are the frames of a step.
 fn steps(stand: &Stand, path: &[DVec3]) -> Vec<Stand> {
     let leaves = |from: usize, frame: usize| path[frame].distance(path[from]) > HELD;
     let ends = |from: usize| (from..stand.to).find(|&frame| leaves(from, frame));

@@ -323,27 +323,3 @@ impl Keyframes {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_keyframe_is_taken_apart_from_its_end() {
-        let keyframe = FileKeyframe::from_str("a:b@c.bvh:75@60").unwrap();
-        assert_eq!(keyframe.file, PathBuf::from("a:b@c.bvh"));
-        assert_eq!((keyframe.frame, keyframe.time), (75, 60));
-        for bad in [
-            "a.bvh",
-            "a.bvh:1",
-            "a.bvh@3",
-            "a.bvh:-1@3",
-            "a.bvh:1@x",
-            ":1@2",
-            "a.bvh:1@999999999",
-            "a.bvh:1@18446744073709551615",
-        ] {
-            assert!(FileKeyframe::from_str(bad).is_err(), "{bad}");
-        }
-    }
-}

@@ -1,8 +1,9 @@
 //! Synthesis: keyframes and controls become motion that can be played.
 //!
-//! A [`SequenceRequest`] holds keyframes, root trajectory and velocity factors; the methods of [`controls`] change them; [`synthesise`] asks a
-//! model for one transition after another, fits joint rotations to what it predicts, bends each transition onto its keyframe
-//! and, where asked, pins the feet.
+//! A [`SequenceRequest`] holds keyframes, root trajectory and velocity factors; the methods of
+//! [`controls`] change them; [`synthesise`] asks a model for one transition after another, fits
+//! joint rotations to what it predicts, bends each transition onto its keyframe and, where asked,
+//! pins the feet.
 
 mod blend;
 pub mod controls;

@@ -8,10 +8,11 @@ use crate::motion::placement::world_positions;
 /// A transition as a clip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SynthesisedMotion {
-    /// Keyframe k1 as it was given, then the predicted frames: N + 1 poses on the request's skeleton.
+    /// Keyframe k1 as it was given, then the predicted frames: N + 1 poses on the request's
+    /// skeleton.
     pub clip: Clip,
-    /// Mean over predicted frames and joints of the distance from the predicted position to the clip's, cm: what is lost where
-    /// predicted bones are longer or shorter than the skeleton's.
+    /// Mean over predicted frames and joints of the distance from the predicted position to the
+    /// clip's, cm: what is lost where predicted bones are longer or shorter than the skeleton's.
     pub mean_error: f64,
     /// The largest of these distances, cm.
     pub max_error: f64,

@@ -30,13 +30,15 @@ pub struct KeyframeSource<'a> {
     pub time: usize,
 }
 
-/// Keyframes k_0 .. k_K with K transitions between them, and the controls of all frames from the first to the last.
+/// Keyframes k_0 .. k_K with K transitions between them, and the controls of all frames from the
+/// first to the last.
 ///
-/// F = time of the last keyframe + 1 is the number of frames of the result. The controls of [`super::controls`] change one request into
-/// another.
+/// F = time of the last keyframe + 1 is the number of frames of the result. The controls of
+/// [`super::controls`] change one request into another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SequenceRequest {
-    /// The dance skeleton with constant bones: every keyframe's translations but the root's are these offsets.
+    /// The dance skeleton with constant bones: every keyframe's translations but the root's are
+    /// these offsets.
     pub skeleton: Skeleton,
     /// Seconds from one frame to the next.
     pub frame_time: f64,
@@ -49,15 +51,17 @@ pub struct SequenceRequest {
 }
 
 impl SequenceRequest {
-    /// Keyframes from one or several clips. The first one's dancer dances: keyframes of others are put onto the same bones by their
-    /// joints' rotations, the height of the root scaled by the length of the legs.
+    /// Keyframes from one or several clips. The first one's dancer dances: keyframes of others are
+    /// put onto the same bones by their joints' rotations, the height of the root scaled by the
+    /// length of the legs.
     ///
-    /// The root goes along a smooth curve through the keyframes' roots, and the velocity factors evenly from each keyframe's to the next one's.
-    /// Between two keyframes of one clip in its order the dancer turns as often as there; else the shorter way.
+    /// The root goes along a smooth curve through the keyframes' roots, and the velocity factors
+    /// evenly from each keyframe's to the next one's. Between two keyframes of one clip in its
+    /// order the dancer turns as often as there; else the shorter way.
     ///
     /// # Errors
-    /// Fewer than two keyframes, times that do not ascend from 0, frames that a clip does not have, dancers whose rotations mean different
-    /// things.
+    /// Fewer than two keyframes, times that do not ascend from 0, frames that a clip does not have,
+    /// dancers whose rotations mean different things.
     pub fn from_keyframes(sources: &[KeyframeSource<'_>]) -> Result<Self, SynthesisError> {
         let times: Vec<usize> = sources.iter().map(|source| source.time).collect();
         check_times(&times)?;
@@ -101,8 +105,9 @@ impl SequenceRequest {
         Ok(request)
     }
 
-    /// Frames `frames` (ascending, at the clip's rate) of a recorded clip as keyframes, its root trajectory and velocity factors as
-    /// controls; frame `frames[0]` becomes frame 0 of the result. Nothing else of the recorded motion goes in.
+    /// Frames `frames` (ascending, at the clip's rate) of a recorded clip as keyframes, its root
+    /// trajectory and velocity factors as controls; frame `frames[0]` becomes frame 0 of the
+    /// result. Nothing else of the recorded motion goes in.
     ///
     /// # Errors
     /// As [`SequenceRequest::from_keyframes`].
@@ -123,7 +128,8 @@ impl SequenceRequest {
         Self::from_keyframes(&sources)?.like(clip, first)
     }
 
-    /// The same with root trajectory and velocity factors of a clip, from its frame `first` on. Keyframes are not moved.
+    /// The same with root trajectory and velocity factors of a clip, from its frame `first` on.
+    /// Keyframes are not moved.
     ///
     /// # Errors
     /// The clip ends before the last keyframe.
@@ -151,10 +157,12 @@ impl SequenceRequest {
             .collect()
     }
 
-    /// Checks that the parts fit together; what concerns single transitions is checked by the model that is asked.
+    /// Checks that the parts fit together; what concerns single transitions is checked by the model
+    /// that is asked.
     ///
     /// # Errors
-    /// Fewer than two keyframes, times that do not ascend from 0, controls of another shape than `[F, 3]` and `[F, 5]`.
+    /// Fewer than two keyframes, times that do not ascend from 0, controls of another shape than
+    /// `[F, 3]` and `[F, 5]`.
     pub fn check(&self) -> Result<(), SynthesisError> {
         let times = self.times();
         check_times(&times)?;
@@ -167,7 +175,8 @@ impl SequenceRequest {
         )
     }
 
-    /// The request for the frames from the first of these keyframes to the last, under the controls of the same frames.
+    /// The request for the frames from the first of these keyframes to the last, under the controls
+    /// of the same frames.
     ///
     /// # Panics
     /// Without keyframes.
@@ -232,7 +241,8 @@ pub(super) fn check_shape(
 
 /// A frame of a clip as a keyframe: its features and its pose.
 ///
-/// Frame 0 of a clip has no velocity; it takes that of frame 1, and the velocity factors that go with it.
+/// Frame 0 of a clip has no velocity; it takes that of frame 1, and the velocity factors that go
+/// with it.
 ///
 /// # Errors
 /// [`SynthesisError::NoFrame`].

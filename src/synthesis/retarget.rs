@@ -12,10 +12,12 @@ use crate::motion::{Pose, Skeleton};
 const SAME: f64 = 1e-6;
 /// Rest directions of a bone may differ by this between two dancers, rad.
 const REST: f64 = 0.5;
-/// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis stands.
+/// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis
+/// stands.
 const LEGS: [usize; 4] = [2, 3, 6, 7];
 
-/// The skeleton with the bones that it has in `pose`: where joints move in their parents' frames, as they stand there.
+/// The skeleton with the bones that it has in `pose`: where joints move in their parents' frames,
+/// as they stand there.
 pub(super) fn bones_of(skeleton: &Skeleton, pose: &Pose) -> Skeleton {
     let mut skeleton = skeleton.clone();
     for (joint, translation) in skeleton.joints.iter_mut().zip(&pose.translations).skip(1) {
@@ -24,8 +26,8 @@ pub(super) fn bones_of(skeleton: &Skeleton, pose: &Pose) -> Skeleton {
     skeleton
 }
 
-/// A keyframe of the same dancer with the skeleton's constant bones: rotations fitted to its positions where joints moved in their
-/// parents' frames, itself where none did.
+/// A keyframe of the same dancer with the skeleton's constant bones: rotations fitted to its
+/// positions where joints moved in their parents' frames, itself where none did.
 pub(super) fn with_constant_bones(
     mut keyframe: KeyframePose,
     skeleton: &Skeleton,
@@ -47,13 +49,15 @@ pub(super) fn with_constant_bones(
     Ok(keyframe)
 }
 
-/// A keyframe of another dancer on this skeleton: every joint keeps its rotation, the root's height is scaled by the length of the legs.
+/// A keyframe of another dancer on this skeleton: every joint keeps its rotation, the root's height
+/// is scaled by the length of the legs.
 ///
-/// `from` is the other dancer's skeleton with constant bones, as `keyframe` has them; `clip` names it in errors.
+/// `from` is the other dancer's skeleton with constant bones, as `keyframe` has them; `clip` names
+/// it in errors.
 ///
 /// # Errors
-/// [`SynthesisError::RestPose`]: the two skeletons' bones point in different directions at rest, so that rotations of one mean
-/// nothing on the other.
+/// [`SynthesisError::RestPose`]: the two skeletons' bones point in different directions at rest, so
+/// that rotations of one mean nothing on the other.
 pub(super) fn retarget(
     mut keyframe: KeyframePose,
     from: &Skeleton,

@@ -28,8 +28,8 @@ pub struct SynthesisOptions {
     pub foot_cleanup: bool,
 }
 
-/// How far a model's last frame is from the keyframe that it was to meet, before it is bent onto it: distances of the joints' world
-/// positions, cm.
+/// How far a model's last frame is from the keyframe that it was to meet, before it is bent onto
+/// it: distances of the joints' world positions, cm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KeyframeMiss {
     /// Frame of the result.
@@ -38,7 +38,8 @@ pub struct KeyframeMiss {
     pub max: f64,
 }
 
-/// Distances from predicted positions to those of the fitted rotations, over all predicted frames and joints, cm.
+/// Distances from predicted positions to those of the fitted rotations, over all predicted frames
+/// and joints, cm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitError {
     pub mean: f64,
@@ -52,8 +53,9 @@ pub struct Sequence {
     pub clip: Clip,
     /// Frames of the keyframes.
     pub keyframes: Vec<usize>,
-    /// Features of `clip`, `[F, 149]`: o^r is the predicted angle, bent onto the keyframes; p^b (turned by it), p^r, v^b and v^r are measured on
-    /// the poses; c is as predicted (0 to 1, clamped).
+    /// Features of `clip`, `[F, 149]`: o^r is the predicted angle, bent onto the keyframes; p^b
+    /// (turned by it), p^r, v^b and v^r are measured on the poses; c is as predicted (0 to 1,
+    /// clamped).
     pub features: Array2<f64>,
     /// Whether contact is predicted, `[F]` of LeftFoot, LeftToeBase, RightFoot, RightToeBase.
     pub contacts: Vec<[bool; 4]>,
@@ -63,7 +65,8 @@ pub struct Sequence {
     pub foot_skate: FootSkate,
 }
 
-/// Mean distance that a foot joint moves a frame in the world while contact is predicted, cm/frame; none where no contact is.
+/// Mean distance that a foot joint moves a frame in the world while contact is predicted, cm/frame;
+/// none where no contact is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FootSkate {
     /// Before the feet are pinned.
@@ -83,7 +86,8 @@ impl Sequence {
     }
 }
 
-/// How far the root of a sequence is from the trajectory that was asked for, mean and maximum over its frames, cm.
+/// How far the root of a sequence is from the trajectory that was asked for, mean and maximum over
+/// its frames, cm.
 pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64, f64) {
     let asked = request.root_trajectory.rows().into_iter();
     let distances: Vec<f64> = asked
@@ -96,9 +100,10 @@ pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64,
 
 /// Generates the motion of a request and makes it one clip `name`.
 ///
-/// A model that fills the frames between two poses is asked for one transition after another, each from the last frame of the
-/// one before after that was bent onto its keyframe: the features it starts from are measured on the bent motion. Any other
-/// model is asked once, for all frames. Joint rotations are the model's own where it makes them, else fitted to its positions.
+/// A model that fills the frames between two poses is asked for one transition after another, each
+/// from the last frame of the one before after that was bent onto its keyframe: the features it
+/// starts from are measured on the bent motion. Any other model is asked once, for all frames.
+/// Joint rotations are the model's own where it makes them, else fitted to its positions.
 ///
 /// # Errors
 /// The request does not fit together, the model fails, or predicts what no skeleton can take.
@@ -187,7 +192,8 @@ impl<'r> Made<'r> {
         let mut keyframes = request.keyframes[index..=end].to_vec();
         let (from, to) = (keyframes[0].time, keyframes[end - index].time);
         let start = self.last();
-        // A model that has made a turn too many or too few is not asked for it back: the targets count their turns from there.
+        // A model that has made a turn too many or too few is not asked for it back: the targets
+        // count their turns from there.
         let facing = FACING.start;
         let turned = start.features[facing] - keyframes[0].keyframe.features[facing];
         keyframes[0].keyframe = start;
@@ -283,7 +289,8 @@ impl<'r> Made<'r> {
         }
     }
 
-    /// Features of some frames, measured on the poses; the first of them keeps the velocity of the first keyframe.
+    /// Features of some frames, measured on the poses; the first of them keeps the velocity of the
+    /// first keyframe.
     fn features(&self, range: Range<usize>) -> Array2<f64> {
         let first = &self.request.keyframes[0].keyframe.features;
         let mut rows = Array2::zeros((range.len(), FRAME));

@@ -13,7 +13,8 @@ const LONGEST: usize = 250;
 /// A root that a keyframe was moved by more than this is worth a word, cm.
 const MOVED: f64 = 1.0;
 const TRUNK: usize = 0;
-/// A contradiction is a trunk that would have to move at more than this many times its velocity factor, and by more than `SLACK` cm/frame more.
+/// A contradiction is a trunk that would have to move at more than this many times its velocity
+/// factor, and by more than `SLACK` cm/frame more.
 const TOLERANCE: f64 = 1.2;
 const SLACK: f64 = 0.2;
 
@@ -120,7 +121,8 @@ impl fmt::Display for ControlWarning {
     }
 }
 
-/// What a model trained on data with these ranges has not seen, and transitions longer than the paper's: one warning a kind.
+/// What a model trained on data with these ranges has not seen, and transitions longer than the
+/// paper's: one warning a kind.
 pub fn control_warnings(
     request: &SequenceRequest,
     ranges: Option<&DataRanges>,
@@ -189,7 +191,8 @@ pub fn control_warnings(
     warnings
 }
 
-/// What the trajectory alone makes of the trunk's velocity factor (eq. 1 with a body that keeps its pose), cm/frame.
+/// What the trajectory alone makes of the trunk's velocity factor (eq. 1 with a body that keeps its
+/// pose), cm/frame.
 fn least_trunk(request: &SequenceRequest, frame: usize) -> f64 {
     let Some(before) = frame.checked_sub(1) else {
         return 0.0;
@@ -201,7 +204,8 @@ fn least_trunk(request: &SequenceRequest, frame: usize) -> f64 {
     share * distance(root.row(before), root.row(frame))
 }
 
-/// How far the trunk's velocity factors fall short of what the trajectory makes them, in frames where that is more than rounding.
+/// How far the trunk's velocity factors fall short of what the trajectory makes them, in frames
+/// where that is more than rounding.
 fn shortfalls(request: &SequenceRequest) -> impl Iterator<Item = f64> + '_ {
     (0..request.frames()).map(|frame| {
         let asked = request.velocity_factors[[frame, TRUNK]];

@@ -9,10 +9,18 @@ mod real_data;
 mod dance_clip;
 
 // The tests.
+mod adam;
 mod autograd;
 mod bvh;
 mod choreography;
+mod contact;
 mod dataset;
 mod features;
 mod fit;
+mod ik;
+mod learning_rate;
 mod mapping;
+mod resample;
+mod rotation_fit;
+mod split;
+mod velocity_factor;

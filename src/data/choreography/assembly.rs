@@ -1,4 +1,5 @@
-//! From the score to local rotations: legs by inverse kinematics, trunk, head and arms from their curves.
+//! From the score to local rotations: legs by inverse kinematics, trunk, head and arms from their
+//! curves.
 
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 use rand::RngExt;
@@ -124,8 +125,8 @@ pub fn poses(
         .collect()
 }
 
-/// What carries the arms along: how far the left foot is ahead of the right (cm), and how far the pelvis is above its usual
-/// height (cm), in every frame.
+/// What carries the arms along: how far the left foot is ahead of the right (cm), and how far the
+/// pelvis is above its usual height (cm), in every frame.
 fn carried(score: &Score, feet: &[Vec<FootPose>; 2], pelvis: &[Pelvis]) -> Vec<[f64; 2]> {
     let usual = STANDING - score.style.bend - 0.3 * score.style.depth;
     let raw: Vec<[f64; 2]> = pelvis
@@ -147,7 +148,8 @@ fn bent(forward: f64, left: f64, turn: f64) -> DQuat {
     DQuat::from_euler(EulerRot::YXZ, turn, forward, -left)
 }
 
-/// Local rotations of UpLeg, Leg and Foot that bring the ankle where the foot has it, the knee forward.
+/// Local rotations of UpLeg, Leg and Foot that bring the ankle where the foot has it, the knee
+/// forward.
 fn leg_rotations(pelvis: &Pelvis, foot: &FootPose, side: f64) -> [DQuat; 3] {
     let hip = pelvis.hip(side);
     let ankle = hip + within_reach(foot.ankle() - hip);
@@ -166,7 +168,8 @@ fn leg_rotations(pelvis: &Pelvis, foot: &FootPose, side: f64) -> [DQuat; 3] {
     ]
 }
 
-/// A leg's reach from hip to ankle: as wished up to the stretch of a planted leg, beyond it less and less.
+/// A leg's reach from hip to ankle: as wished up to the stretch of a planted leg, beyond it less
+/// and less.
 fn within_reach(wish: DVec3) -> DVec3 {
     let (soft, hard) = (STRETCH * (THIGH + SHIN), SWING_STRETCH * (THIGH + SHIN));
     let length = wish.length();

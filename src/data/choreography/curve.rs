@@ -42,7 +42,8 @@ impl<const K: usize> Track<K> {
         self.keys.last().map_or([0.0; K], |(_, value)| *value)
     }
 
-    /// The curve at frame `t`: cubic Hermite pieces whose slopes never overshoot the keys (Fritsch and Carlson 1980).
+    /// The curve at frame `t`: cubic Hermite pieces whose slopes never overshoot the keys (Fritsch
+    /// and Carlson 1980).
     pub fn at(&self, t: f64) -> [f64; K] {
         let after = self.keys.partition_point(|(frame, _)| *frame <= t);
         if after == 0 {
@@ -70,7 +71,8 @@ impl<const K: usize> Track<K> {
         (0..frames).map(|frame| self.at(frame as f64)).collect()
     }
 
-    /// The slope at a key: zero at extremes and ends, else the harmonic mean of the neighbouring slopes.
+    /// The slope at a key: zero at extremes and ends, else the harmonic mean of the neighbouring
+    /// slopes.
     fn slope(&self, key: usize, k: usize) -> f64 {
         if key == 0 || key + 1 >= self.keys.len() {
             return 0.0;
@@ -101,7 +103,8 @@ pub fn ease(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Smooths each number over time with a Gaussian of `sigma` frames, ends held; the kernel reaches `ceil(3 sigma)` frames.
+/// Smooths each number over time with a Gaussian of `sigma` frames, ends held; the kernel reaches
+/// `ceil(3 sigma)` frames.
 pub fn smooth<const K: usize>(values: &[[f64; K]], sigma: f64) -> Vec<[f64; K]> {
     if values.is_empty() {
         return Vec::new();

@@ -1,7 +1,8 @@
 //! The foot plan: where each foot is planted, and how it swings from one place to the next.
 //!
-//! A foot is given by the ball of the foot (the ToeBase joint), its direction about Y and its pitch, positive with the heel
-//! raised. While planted the ball stays where it is; the heel rises, lowers and turns about it.
+//! A foot is given by the ball of the foot (the ToeBase joint), its direction about Y and its
+//! pitch, positive with the heel raised. While planted the ball stays where it is; the heel rises,
+//! lowers and turns about it.
 
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 
@@ -12,7 +13,8 @@ use super::curve::Track;
 const SHORTEST_SWING: f64 = 5.0;
 /// Frames that a heel takes to come down after the ball has landed.
 const SETTLE: f64 = 3.0;
-/// Least mean speed (cm/frame) of a heel that rises, lowers or turns, and of a foot that steps: a slow dancer waits, then moves.
+/// Least mean speed (cm/frame) of a heel that rises, lowers or turns, and of a foot that steps: a
+/// slow dancer waits, then moves.
 const BRISK: f64 = 1.05;
 /// Smallest turn (rad) worth a pivot.
 const SMALLEST_PIVOT: f64 = 0.15;
@@ -51,7 +53,8 @@ impl Foot {
     }
 }
 
-/// Where a foot is to be planted: its ball on the floor (x, z in cm) and its direction about Y, rad.
+/// Where a foot is to be planted: its ball on the floor (x, z in cm) and its direction about Y,
+/// rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     pub ball: DVec2,
@@ -192,8 +195,8 @@ impl FootPlan {
         &mut self.stances[last]
     }
 
-    /// Turns the planted foot about its ball and raises its heel: the pose is met at `to`, begun at `from` or as much later as a
-    /// brisk movement allows. Frames; angles in rad.
+    /// Turns the planted foot about its ball and raises its heel: the pose is met at `to`, begun at
+    /// `from` or as much later as a brisk movement allows. Frames; angles in rad.
     pub fn roll(&mut self, from: f64, to: f64, yaw: f64, pitch: f64) {
         let stance = self.last_mut();
         let [yaw_before, pitch_before] = stance.pose.last();
@@ -221,8 +224,9 @@ impl FootPlan {
         self.roll(middle, to, yaw, 0.0);
     }
 
-    /// Swings the foot to `placement`: the heel starts to rise at frame `from`, the ball leaves the floor at `off` (where the roll
-    /// over the ball decides if `None`) and lands at `to`; a short step begins later. Returns the frame of landing, later than `to` where time was too short.
+    /// Swings the foot to `placement`: the heel starts to rise at frame `from`, the ball leaves the
+    /// floor at `off` (where the roll over the ball decides if `None`) and lands at `to`; a short
+    /// step begins later. Returns the frame of landing, later than `to` where time was too short.
     pub fn swing(
         &mut self,
         from: f64,
@@ -322,8 +326,9 @@ fn between(from: &Stance, to: &Stance, t: f64) -> FootPose {
     }
 }
 
-/// The true contacts of one foot: for each frame whether the heel (LeftFoot, RightFoot) and the ball (ToeBase) were held still
-/// on the floor since the frame before. The first frame counts what the second does.
+/// The true contacts of one foot: for each frame whether the heel (LeftFoot, RightFoot) and the
+/// ball (ToeBase) were held still on the floor since the frame before. The first frame counts what
+/// the second does.
 pub fn contacts(poses: &[FootPose]) -> Vec<[bool; 2]> {
     let mut labels: Vec<[bool; 2]> = poses
         .windows(2)

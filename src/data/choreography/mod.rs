@@ -1,9 +1,10 @@
 //! The built-in choreography: human dance motion on the dance skeleton, from a seed.
 //!
-//! For whoever has no motion capture. A clip is made in layers, each a file, in this order:
-//! `style` (what kind of dance) and `rhythm` (beats to frames); `figures` write a `score`: what feet, pelvis, trunk,
-//! head and arms do when; `feet` turns it into planted and swinging feet and the true contacts; `pelvis` finds
-//! the path of the pelvis within the legs' reach; `assembly` finds the rotations, the legs' by inverse kinematics.
+//! For whoever has no motion capture. A clip is made in layers, each a file, in this order: `style`
+//! (what kind of dance) and `rhythm` (beats to frames); `figures` write a `score`: what feet,
+//! pelvis, trunk, head and arms do when; `feet` turns it into planted and swinging feet and the
+//! true contacts; `pelvis` finds the path of the pelvis within the legs' reach; `assembly` finds
+//! the rotations, the legs' by inverse kinematics.
 
 mod assembly;
 mod body;
@@ -48,7 +49,8 @@ pub struct ChoreographyConfig {
     pub clips: usize,
     /// Frames of each clip, at 30 a second.
     pub frames_per_clip: usize,
-    /// Everything follows from it, to the bit on one platform. Clip n is the same however many clips are asked for.
+    /// Everything follows from it, to the bit on one platform. Clip n is the same however many
+    /// clips are asked for.
     pub seed: u64,
 }
 
@@ -80,15 +82,16 @@ pub enum ChoreographyError {
 pub struct GeneratedClip {
     /// The motion: dance skeleton, cm, 30 frames a second.
     pub clip: Clip,
-    /// `[frames]` of LeftFoot, LeftToeBase, RightFoot, RightToeBase: whether the joint was held still by a planted foot since the
-    /// frame before. The first frame counts what the second does.
+    /// `[frames]` of LeftFoot, LeftToeBase, RightFoot, RightToeBase: whether the joint was held
+    /// still by a planted foot since the frame before. The first frame counts what the second does.
     pub contacts: Vec<[bool; 4]>,
 }
 
 /// Generates the clips of a configuration.
 ///
 /// # Errors
-/// [`ChoreographyError`] where no clip or more than 1000 are asked for, or clips shorter or longer than what can be made.
+/// [`ChoreographyError`] where no clip or more than 1000 are asked for, or clips shorter or longer
+/// than what can be made.
 pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, ChoreographyError> {
     Ok(clips(config)?.collect())
 }

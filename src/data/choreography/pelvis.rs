@@ -11,7 +11,8 @@ use super::score::{Jump, Score};
 const GRAVITY: f64 = 981.0 / 900.0;
 /// Share of the leg's length to which a planted leg stretches.
 pub const STRETCH: f64 = 0.993;
-/// Frames by which the limit of the height looks ahead and back; the smoothing's kernel reaches as far.
+/// Frames by which the limit of the height looks ahead and back; the smoothing's kernel reaches as
+/// far.
 const LOOK: usize = 6;
 /// Width (cm) over which the wished height gives way to the limit.
 const BLEND: f64 = 1.0;
@@ -127,8 +128,8 @@ fn supports(score: &Score, feet: &[Vec<FootPose>; 2]) -> Vec<[f64; 2]> {
     smooth(&support, 2.0 + 0.1 * score.rhythm.beat())
 }
 
-/// The greatest height of the root at which the legs reach whose feet are on the floor or are so within `near` frames, cm;
-/// infinite with both in the air.
+/// The greatest height of the root at which the legs reach whose feet are on the floor or are so
+/// within `near` frames, cm; infinite with both in the air.
 fn limit(pelvis: &Pelvis, feet: [&FootPose; 2], near: f64) -> f64 {
     let reach = STRETCH * (THIGH + SHIN);
     [1.0, -1.0]
@@ -144,8 +145,8 @@ fn limit(pelvis: &Pelvis, feet: [&FootPose; 2], near: f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Replaces the height over one jump: crouch, stretch, ballistic flight, landing, recovery, never above what the planted legs
-/// reach.
+/// Replaces the height over one jump: crouch, stretch, ballistic flight, landing, recovery, never
+/// above what the planted legs reach.
 fn fly(jump: &Jump, limits: &[f64], pelvis: &mut [Pelvis]) {
     let frames = pelvis.len();
     let height = |frame: f64| {

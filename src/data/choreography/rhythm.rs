@@ -19,7 +19,8 @@ pub struct Rhythm {
 }
 
 impl Rhythm {
-    /// A rhythm of about `bpm` beats a minute, its tempo swelling by up to `rubato` (a share of the tempo).
+    /// A rhythm of about `bpm` beats a minute, its tempo swelling by up to `rubato` (a share of the
+    /// tempo).
     pub fn new(bpm: f64, rubato: f64, rng: &mut ChaCha12Rng) -> Self {
         Self {
             beat: 60.0 * FRAME_RATE / bpm,

@@ -1,4 +1,5 @@
-//! The score of one dance: what feet, pelvis, trunk, head and arms are to do when, written by figures one after another.
+//! The score of one dance: what feet, pelvis, trunk, head and arms are to do when, written by
+//! figures one after another.
 
 use glam::DVec2;
 
@@ -114,7 +115,8 @@ impl Score {
         DVec2::new(sin * forward + cos * left, cos * forward - sin * left)
     }
 
-    /// Where a foot stands under a dancer at `centre` who faces `heading`, `wider` cm farther out than in the style's own stance.
+    /// Where a foot stands under a dancer at `centre` who faces `heading`, `wider` cm farther out
+    /// than in the style's own stance.
     pub fn home(&self, foot: Foot, centre: DVec2, heading: f64, wider: f64) -> Placement {
         let half = self.style.half_stance + wider;
         let yaw = heading + foot.side() * self.style.turnout;
@@ -124,8 +126,9 @@ impl Score {
         Placement { ball, yaw }
     }
 
-    /// Steps with `foot` to a placement between two beats counted from here, and shifts the weight: at the landing the weight is
-    /// between the feet, half of the step's time later mostly on the landed foot.
+    /// Steps with `foot` to a placement between two beats counted from here, and shifts the weight:
+    /// at the landing the weight is between the feet, half of the step's time later mostly on the
+    /// landed foot.
     pub fn step(&mut self, foot: Foot, from: f64, to: f64, placement: Placement, swing: Swing) {
         let (start, end) = (self.frame(from), self.frame(to));
         let placement = self.within_stride(foot, placement);
@@ -167,8 +170,8 @@ impl Score {
         self.sink.key(frame, [depth]);
     }
 
-    /// Keys the spine at `beats` from here (degrees: forward, left, turn to the left), scaled by the style and kept
-    /// within what a spine does.
+    /// Keys the spine at `beats` from here (degrees: forward, left, turn to the left), scaled by
+    /// the style and kept within what a spine does.
     pub fn spine(&mut self, beats: f64, bend: [f64; 3]) {
         let frame = self.frame(beats);
         let scale = 2.5 * self.style.trunk;
@@ -176,7 +179,8 @@ impl Score {
         self.spine.key(frame, bend);
     }
 
-    /// Keys the tilt of the pelvis at `beats` from here (degrees: forward, left), scaled by the style.
+    /// Keys the tilt of the pelvis at `beats` from here (degrees: forward, left), scaled by the
+    /// style.
     pub fn tilt(&mut self, beats: f64, tilt: [f64; 2]) {
         let frame = self.frame(beats);
         let scale = 1.6 * self.style.trunk;

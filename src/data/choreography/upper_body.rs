@@ -1,4 +1,5 @@
-//! Arms as a dancer thinks of them: where the upper arm points, how the elbow bends, how the wrist trails.
+//! Arms as a dancer thinks of them: where the upper arm points, how the elbow bends, how the wrist
+//! trails.
 
 use glam::{DQuat, DVec3};
 
@@ -7,7 +8,8 @@ use super::curve::Track;
 /// Frames by which the elbow trails the shoulder, and the wrist the elbow.
 const TRAIL: f64 = 2.0;
 
-/// One arm, angles in degrees, mirrored for the right arm. All zero: stretched to the side, elbow creases forward.
+/// One arm, angles in degrees, mirrored for the right arm. All zero: stretched to the side, elbow
+/// creases forward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmPose {
     /// Upper arm forward (+90 straight ahead, more across the chest, negative behind).
@@ -94,7 +96,8 @@ impl ArmPose {
 
     /// Local rotations of Shoulder, Arm, ForeArm and Hand; `side` is +1 for the left arm.
     pub fn rotations(self, side: f64) -> [DQuat; 4] {
-        // A rotation mirrored in the plane X = 0 keeps its X component and changes the sign of the others.
+        // A rotation mirrored in the plane X = 0 keeps its X component and changes the sign of the
+        // others.
         let turn = |x: f64, y: f64, z: f64| {
             DQuat::from_scaled_axis(DVec3::new(x, side * y, side * z) * 1f64.to_radians())
         };

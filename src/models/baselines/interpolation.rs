@@ -1,4 +1,5 @@
-//! The baseline "Interpolation": joint rotations slerped between the keyframes, on the given root trajectory.
+//! The baseline "Interpolation": joint rotations slerped between the keyframes, on the given root
+//! trajectory.
 
 use glam::{DQuat, DVec3};
 use ndarray::s;
@@ -11,12 +12,14 @@ use crate::models::transition::{KeyframePose, Transition, TransitionModel, Trans
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 use crate::motion::{Pose, Skeleton};
 
-/// Spherical interpolation between the keyframes (the row "Interpolation" of table 2). Nothing is learned.
+/// Spherical interpolation between the keyframes (the row "Interpolation" of table 2). Nothing is
+/// learned.
 ///
-/// Each pose is first turned about Y to face +Z: its root's rotation becomes `R_y(-o^r) R`. Local rotations are slerped along
-/// the shorter arc, local translations interpolated linearly, and forward kinematics with the root at the origin gives p^b.
-/// p^r is the given trajectory. o^r goes the shorter way round. Velocities are differences of positions, and a contact label is
-/// 1 where the joint's squared speed in the world is below [`Interpolation::contact_threshold`].
+/// Each pose is first turned about Y to face +Z: its root's rotation becomes `R_y(-o^r) R`. Local
+/// rotations are slerped along the shorter arc, local translations interpolated linearly, and
+/// forward kinematics with the root at the origin gives p^b. p^r is the given trajectory. o^r goes
+/// the shorter way round. Velocities are differences of positions, and a contact label is 1 where
+/// the joint's squared speed in the world is below [`Interpolation::contact_threshold`].
 ///
 /// The last frame, k2, has p^b of the target keyframe.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,5 @@
-//! The baseline "linear positions": joint positions interpolated linearly between the keyframes, on the given root trajectory.
+//! The baseline "linear positions": joint positions interpolated linearly between the keyframes, on
+//! the given root trajectory.
 
 use ndarray::s;
 use rayon::prelude::*;
@@ -9,10 +10,12 @@ use crate::models::transition::window::wrap;
 use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 
-/// Linear interpolation of p^b between the keyframes. Nothing is learned; bones get shorter on the way.
+/// Linear interpolation of p^b between the keyframes. Nothing is learned; bones get shorter on the
+/// way.
 ///
-/// p^r is the given trajectory. o^r goes the shorter way round. Velocities are differences of positions, and a contact label is
-/// 1 where the joint's squared speed in the world is below [`LinearPositions::contact_threshold`].
+/// p^r is the given trajectory. o^r goes the shorter way round. Velocities are differences of
+/// positions, and a contact label is 1 where the joint's squared speed in the world is below
+/// [`LinearPositions::contact_threshold`].
 ///
 /// The last frame, k2, has p^b of the target keyframe.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,10 +8,11 @@ use crate::models::transition::motion_rows::{rows_from, write_contacts};
 use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
 
-/// Every frame has p^b and o^r of keyframe k1. Nothing is learned, and the target is not looked at: the floor of any model.
+/// Every frame has p^b and o^r of keyframe k1. Nothing is learned, and the target is not looked at:
+/// the floor of any model.
 ///
-/// p^r is the given trajectory. Velocities are differences of positions, and a contact label is 1 where the joint's squared speed
-/// in the world is below [`ZeroVelocity::contact_threshold`].
+/// p^r is the given trajectory. Velocities are differences of positions, and a contact label is 1
+/// where the joint's squared speed in the world is below [`ZeroVelocity::contact_threshold`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZeroVelocity {
     /// Squared world speed below which a foot joint counts as planted, (cm/frame)^2.

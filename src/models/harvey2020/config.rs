@@ -50,7 +50,8 @@ pub struct Harvey2020Config {
     pub noise_from: usize,
     /// Frames before the target from which on the target noise is whole.
     pub noise_whole: usize,
-    /// Standard deviation of the Gaussian that smooths the facing direction of predicted frames, frames: as `data.facing_sigma`.
+    /// Standard deviation of the Gaussian that smooths the facing direction of predicted frames,
+    /// frames: as `data.facing_sigma`.
     pub facing_sigma: f64,
     pub loss: HarveyLossWeights,
 }
@@ -83,7 +84,8 @@ impl Harvey2020Config {
         }
     }
 
-    /// Share of the target noise `arrival` frames before the target: 0 up to `noise_from`, 1 from `noise_whole` on.
+    /// Share of the target noise `arrival` frames before the target: 0 up to `noise_from`, 1 from
+    /// `noise_whole` on.
     pub(super) fn noise_share(&self, arrival: usize) -> f64 {
         let span = (self.noise_whole - self.noise_from) as f64;
         ((arrival as f64 - self.noise_from as f64) / span).clamp(0.0, 1.0)

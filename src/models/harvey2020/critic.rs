@@ -7,7 +7,8 @@ use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::CRITICS;
 use crate::nn::{Activation, Initialiser, LastLayer, Mlp};
 
-/// Numbers of a frame that a critic sees: 23 joints relative to the root and the velocities of all 24.
+/// Numbers of a frame that a critic sees: 23 joints relative to the root and the velocities of all
+/// 24.
 pub(super) const SEEN: usize = 69 + 72;
 /// Names, and frames that each critic sees at once.
 const CRITICS_OF_THE_PAPER: [(&str, usize); 2] = [("short", 2), ("long", 10)];
@@ -24,7 +25,8 @@ pub(super) struct Critic {
 pub(super) struct Judgement {
     /// Sum over critics of the mean of 1/2 (D(predicted) - 1)^2, the critics held.
     pub(super) generator: Var,
-    /// Sum over critics of the means of 1/2 (D(recorded) - 1)^2 and 1/2 D(predicted)^2, the motion held.
+    /// Sum over critics of the means of 1/2 (D(recorded) - 1)^2 and 1/2 D(predicted)^2, the motion
+    /// held.
     pub(super) critics: Var,
 }
 
@@ -45,7 +47,8 @@ impl Critic {
             .collect()
     }
 
-    /// Windows of frames in a row, `[(N - frames + 1) * windows, frames * 141]`, from `seen [N * windows, 141]`.
+    /// Windows of frames in a row, `[(N - frames + 1) * windows, frames * 141]`, from `seen [N *
+    /// windows, 141]`.
     fn slide<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -74,8 +77,8 @@ impl Critic {
     }
 }
 
-/// Judges `predicted [N * windows, 141]` beside `recorded`, as a mean over positions in time and over `total_windows`. A critic that
-/// sees more than N frames has no say.
+/// Judges `predicted [N * windows, 141]` beside `recorded`, as a mean over positions in time and
+/// over `total_windows`. A critic that sees more than N frames has no say.
 pub(super) fn judge<T: Real>(
     tape: &mut Tape<'_, T>,
     critics: &[Critic],

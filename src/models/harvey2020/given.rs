@@ -1,5 +1,5 @@
-//! The windows of a batch in the frame of keyframe k1: its root at the origin, facing +Z. There all windows are alike wherever the
-//! dancer is and looks.
+//! The windows of a batch in the frame of keyframe k1: its root at the origin, facing +Z. There all
+//! windows are alike wherever the dancer is and looks.
 
 use glam::{DQuat, DVec3};
 use ndarray::{Array1, Axis};

@@ -8,8 +8,8 @@ use crate::models::LossTerms;
 use crate::models::transition::pose_windows::{OFFSETS, ROTATIONS};
 use crate::motion::{DANCE_PARENTS, JOINTS};
 
-/// The unit of differences of quaternions: from k1 on, they change by about this where joints move by s_p (the mean over windows of
-/// 5 to 70 frames of the dance data's training clips).
+/// The unit of differences of quaternions: from k1 on, they change by about this where joints move
+/// by s_p (the mean over windows of 5 to 70 frames of the dance data's training clips).
 const QUATERNION_UNIT: f64 = 0.07;
 
 /// s_p (cm) and s_v (cm/frame), the scales of p^b and v^b.
@@ -70,8 +70,8 @@ impl Frames {
         })
     }
 
-    /// What the critics see of frames k1 + 1 .. k2, `[N * windows, 141]`: joints relative to the root in units of s_p, velocities in
-    /// units of s_v.
+    /// What the critics see of frames k1 + 1 .. k2, `[N * windows, 141]`: joints relative to the
+    /// root in units of s_p, velocities in units of s_v.
     fn seen<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -90,7 +90,8 @@ impl Frames {
     }
 }
 
-/// Forward kinematics of `rotations [n * windows, 96]`: joints relative to the root, `[n * windows, 72]`, cm.
+/// Forward kinematics of `rotations [n * windows, 96]`: joints relative to the root,
+/// `[n * windows, 72]`, cm.
 pub(super) fn joints<T: Real>(
     tape: &mut Tape<'_, T>,
     given: &Given<'_, T>,
@@ -127,7 +128,8 @@ fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &Given<'_, T>) -> Motion {
 ///
 /// - quaternion: mean of |q~ - q| over the 96 numbers, in units of 0.07;
 /// - root: mean of |r~ - r| over the 3 numbers, in units of s_p;
-/// - position: mean of |p~ - p| over the 72 numbers of all joints with the root where it is, in units of s_p;
+/// - position: mean of |p~ - p| over the 72 numbers of all joints with the root where it is, in
+///   units of s_p;
 /// - contact: mean of |c~ - c| over the 4 labels;
 /// - adversarial, critics: see [`super::critic::Judgement`], with critics only.
 pub(super) fn terms<T: Real>(

@@ -19,12 +19,14 @@ use crate::motion::JOINTS;
 use crate::motion::features::{BODY_VELOCITIES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
 use crate::nn::{Activation, Initialiser, LastLayer, Lstm, Mlp, sinusoidal_positions};
 
-/// Rotations, root velocity, contacts: the state encoder's input, and what the decoder gives (as changes, for the rotations).
+/// Rotations, root velocity, contacts: the state encoder's input, and what the decoder gives (as
+/// changes, for the rotations).
 const STATE: usize = ROTATIONS + 3 + 4;
 /// Root and rotations still to go to the target.
 const OFFSET: usize = 3 + ROTATIONS;
-/// The decoder's unit of a quaternion's change: about the mean change from one frame to the next in the dance data's training clips.
-/// With it, and with the root's in its own unit, an untrained network nearly stands still.
+/// The decoder's unit of a quaternion's change: about the mean change from one frame to the next in
+/// the dance data's training clips. With it, and with the root's in its own unit, an untrained
+/// network nearly stands still.
 const QUATERNION_CHANGE: f64 = 0.01;
 /// Keeps the gradient of a quaternion's length finite at 0.
 const NORM_EPS: f64 = 1e-8;
@@ -41,9 +43,11 @@ pub struct Harvey2020 {
     lstm: Lstm,
     decoder: Mlp,
     critics: Vec<Critic>,
-    /// The time-to-arrival embedding once for each of the three codes, `[arrival_frames + 1, 3 code]`.
+    /// The time-to-arrival embedding once for each of the three codes,
+    /// `[arrival_frames + 1, 3 code]`.
     arrival: Array2<f64>,
-    /// Root mean square of the standard deviations of p^r (cm) and of v^r (cm/frame): units of the root's offset and velocity.
+    /// Root mean square of the standard deviations of p^r (cm) and of v^r (cm/frame): units of the
+    /// root's offset and velocity.
     root_scale: f64,
     root_velocity_scale: f64,
 }

@@ -24,8 +24,8 @@ pub enum Controllers {
 pub enum Output {
     /// The frame itself, as in the paper.
     Absolute,
-    /// What is added to the best linear estimate from the keyframes, and to the given trajectory. An untrained
-    /// network gives just these.
+    /// What is added to the best linear estimate from the keyframes, and to the given trajectory.
+    /// An untrained network gives just these.
     Residual,
 }
 
@@ -75,16 +75,18 @@ pub struct Pan2021Config {
     pub root_frame: RootFrame,
     /// What the decoders give; the paper's give the frame itself.
     pub output: Output,
-    /// A feed-forward path from the controls around each frame to what is added to its estimate; not in the paper.
+    /// A feed-forward path from the controls around each frame to what is added to its estimate;
+    /// not in the paper.
     pub control_path: bool,
     /// Control paths whose mean is taken: an ensemble.
     pub control_path_members: usize,
     /// Both hidden layers of a control path.
     pub control_path_hidden: usize,
-    /// Frames by themselves that a control path is trained on in each step, beside the batch's windows.
+    /// Frames by themselves that a control path is trained on in each step, beside the batch's
+    /// windows.
     pub single_frames: usize,
-    /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper, see
-    /// [`crate::models::transition::velocity_refinement`].
+    /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper,
+    /// see [`crate::models::transition::velocity_refinement`].
     pub velocity_refinement: bool,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,

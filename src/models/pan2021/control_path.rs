@@ -1,4 +1,5 @@
-//! A feed-forward path from the controls around a frame to its p^b, beside the network; not in the paper.
+//! A feed-forward path from the controls around a frame to its p^b, beside the network; not in the
+//! paper.
 
 use rand::Rng;
 
@@ -11,23 +12,26 @@ use crate::models::transition::Batch;
 use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::nn::{Initialiser, LastLayer, Linear, Mlp};
 
-/// Frames, from the one that is predicted, whose controls are seen; those before k1 and after k2 are the keyframes'.
+/// Frames, from the one that is predicted, whose controls are seen; those before k1 and after k2
+/// are the keyframes'.
 const OFFSETS: [isize; 13] = [-20, -12, -7, -4, -2, -1, 0, 1, 2, 4, 7, 12, 20];
 /// From rad a frame to numbers about 1.
 const TURN_SCALE: f64 = 30.0;
 /// What is dropped of the last hidden layer while single frames are trained.
 const DROPOUT: f64 = 0.2;
 
-/// Corrections of the estimate of p^b from the given trajectory, the velocity factors and the keyframes, without memory: an [`Mlp`] of
-/// two hidden layers.
+/// Corrections of the estimate of p^b from the given trajectory, the velocity factors and the
+/// keyframes, without memory: an [`Mlp`] of two hidden layers.
 ///
-/// What it sees of frame t: the mean velocity of p^r from it to each of the [`OFFSETS`] but 0, turned to the direction that is between the
-/// keyframes' o^r there, x and z, in deviations of v^r; the height of the root and, where the network has them, the five velocity factors at each,
-/// standardised; the turn from k1 to k2, rad a frame times 30; the estimate, p^b of k1 and of k2, these two times their likeness to
-/// frame t. All that twice, the second time multiplied with what the estimate leaves open in frame t, as the correction is itself.
+/// What it sees of frame t: the mean velocity of p^r from it to each of the [`OFFSETS`] but 0,
+/// turned to the direction that is between the keyframes' o^r there, x and z, in deviations of v^r;
+/// the height of the root and, where the network has them, the five velocity factors at each,
+/// standardised; the turn from k1 to k2, rad a frame times 30; the estimate, p^b of k1 and of k2,
+/// these two times their likeness to frame t. All that twice, the second time multiplied with what
+/// the estimate leaves open in frame t, as the correction is itself.
 ///
-/// With more than one member it is an ensemble: the correction is the mean of its members', which differ in their initial weights and in what
-/// dropout takes from them.
+/// With more than one member it is an ensemble: the correction is the mean of its members', which
+/// differ in their initial weights and in what dropout takes from them.
 #[derive(Debug, Clone)]
 pub(super) struct ControlPath {
     first: Member,
@@ -105,7 +109,8 @@ impl ControlPath {
         }
     }
 
-    /// Corrections of p^b in frames k1 + 1 .. k2, in deviations of p^b: `[N * windows, 69]`, frame by frame; without dropout.
+    /// Corrections of p^b in frames k1 + 1 .. k2, in deviations of p^b: `[N * windows, 69]`, frame
+    /// by frame; without dropout.
     ///
     /// # Errors
     /// None with the weights that [`ControlPath::new`] added.
@@ -134,8 +139,9 @@ impl ControlPath {
         tape.mul(corrections, seen.open)
     }
 
-    /// The distance of p^b with a member's corrections from the true one, in s_p, the mean over the batch's single frames and the members:
-    /// `[1]`. What LRP measures, of each member by itself: trained on the distance of their mean they would become parts of one network.
+    /// The distance of p^b with a member's corrections from the true one, in s_p, the mean over the
+    /// batch's single frames and the members: `[1]`. What LRP measures, of each member by itself:
+    /// trained on the distance of their mean they would become parts of one network.
     ///
     /// # Errors
     /// Windows of another shape than they are to have, or a frame beyond its window.

@@ -1,11 +1,12 @@
 //! The root trajectory controller and the velocity factor controller (section 3.2, figure 3).
 //!
-//! Both read, for the prediction of frame t + 1, two segments of u frames centred on t + 1: the target segment holds the given
-//! values, the mixture segment what was fed for the frames up to t. Frames beyond an end of the transition repeat it.
+//! Both read, for the prediction of frame t + 1, two segments of u frames centred on t + 1: the
+//! target segment holds the given values, the mixture segment what was fed for the frames up to t.
+//! Frames beyond an end of the transition repeat it.
 //!
-//! A token's embedding is linear in its c numbers plus a constant of its position, so it is one product with the numbers
-//! and a one-hot position, `[c + u]`, and the first layer's self-attention is a [`NarrowAttention`] of them. Its weights are
-//! made once a tape.
+//! A token's embedding is linear in its c numbers plus a constant of its position, so it is one
+//! product with the numbers and a one-hot position, `[c + u]`, and the first layer's self-attention
+//! is a [`NarrowAttention`] of them. Its weights are made once a tape.
 
 use ndarray::Array2;
 use rand::Rng;
@@ -204,7 +205,8 @@ impl TransformerController {
         })
     }
 
-    /// The weights from (numbers, one-hot position) to tokens, and the first self-attention of these.
+    /// The weights from (numbers, one-hot position) to tokens, and the first self-attention of
+    /// these.
     fn compose<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -232,7 +234,8 @@ impl TransformerController {
         })
     }
 
-    /// Codes target segments `[rows, c + u]`: the encoder's output and the decoders' keys and values of it.
+    /// Codes target segments `[rows, c + u]`: the encoder's output and the decoders' keys and
+    /// values of it.
     fn encode<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -262,7 +265,8 @@ impl TransformerController {
         (&self.decoder[last], &self.decoder[..last])
     }
 
-    /// Decodes mixture segments `[windows * u, c + u]` against the memory of the same frame; the code is `[windows, d]`.
+    /// Decodes mixture segments `[windows * u, c + u]` against the memory of the same frame; the
+    /// code is `[windows, d]`.
     fn decode<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -301,8 +305,8 @@ impl<T: Real> Segments<T> {
             .min(self.trajectory.frames - 1)
     }
 
-    /// Writes the target segments of all windows for the prediction of frame `t + 1`, each token followed by `gap` numbers that
-    /// are left alone.
+    /// Writes the target segments of all windows for the prediction of frame `t + 1`, each token
+    /// followed by `gap` numbers that are left alone.
     fn write_target(&self, t: usize, out: &mut [T], gap: usize) {
         let (u, c) = (self.window, self.channels);
         for (window, out) in out.chunks_exact_mut(u * (c + gap)).enumerate() {
@@ -369,7 +373,8 @@ impl Coder<'_> {
             .decode(tape, embedding, mixture, tokens, &projected)
     }
 
-    /// Codes the target segments for the prediction of frame `t + 1`, and of some frames after it where windows are few.
+    /// Codes the target segments for the prediction of frame `t + 1`, and of some frames after it
+    /// where windows are few.
     fn encode<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -408,8 +413,8 @@ impl<T: Real> Session<'_, T> {
         window / 2
     }
 
-    /// The code for the prediction of frame `t + 1`, `[windows, d]`. `fed(i)` is what was fed for frame i, `[windows, c]`,
-    /// asked for the last `past` frames up to t.
+    /// The code for the prediction of frame `t + 1`, `[windows, d]`. `fed(i)` is what was fed for
+    /// frame i, `[windows, c]`, asked for the last `past` frames up to t.
     pub(super) fn code(
         &mut self,
         tape: &mut Tape<'_, T>,

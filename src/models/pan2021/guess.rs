@@ -1,4 +1,5 @@
-//! What a residual network's numbers are added to: the best linear estimate of a frame from the keyframes.
+//! What a residual network's numbers are added to: the best linear estimate of a frame from the
+//! keyframes.
 
 use glam::{DMat3, DVec3};
 
@@ -11,10 +12,12 @@ const KEPT: f64 = 0.2;
 /// Keeps the covariances regular where N is small; of the variance.
 const NUGGET: f64 = 1e-6;
 
-/// Correlation of a number of p^b with itself `frames` later: `KEPT + (1 - KEPT) (1 + d) exp(-d)`, d = frames / TIME (Matern 3/2).
+/// Correlation of a number of p^b with itself `frames` later: `KEPT + (1 - KEPT) (1 + d) exp(-d)`,
+/// d = frames / TIME (Matern 3/2).
 ///
-/// On training clips of the dance data (30 frames a second) that are set aside, an estimate with it is within an LRP of 12.3, 60.2, 73.2 and
-/// 76.5 cm at N = 10, 50, 100 and 150, lines between the keyframes within 16.7, 64.4, 81.0 and 86.3 (`scripts/study_poses.py`).
+/// On training clips of the dance data (30 frames a second) that are set aside, an estimate with it
+/// is within an LRP of 12.3, 60.2, 73.2 and 76.5 cm at N = 10, 50, 100 and 150, lines between the
+/// keyframes within 16.7, 64.4, 81.0 and 86.3 (`scripts/study_poses.py`).
 fn likeness(frames: usize) -> f64 {
     let d = frames as f64 / TIME;
     KEPT + (1.0 - KEPT) * (1.0 + d) * (-d).exp()
@@ -22,9 +25,10 @@ fn likeness(frames: usize) -> f64 {
 
 /// Estimates of the frames of a transition, and what they leave open.
 ///
-/// They are linear in p^b and v^b of k1 and p^b of k2, as differences from their means, with the least expected square error (kriging)
-/// where all numbers correlate as [`likeness`] says and a velocity is the difference to the frame before: near the keyframes the
-/// motion goes on smoothly, far from both it is the mean.
+/// They are linear in p^b and v^b of k1 and p^b of k2, as differences from their means, with the
+/// least expected square error (kriging) where all numbers correlate as [`likeness`] says and a
+/// velocity is the difference to the frame before: near the keyframes the motion goes on smoothly,
+/// far from both it is the mean.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Estimator {
     /// N
@@ -48,17 +52,20 @@ impl Estimator {
         }
     }
 
-    /// Weights of p^b of k1, v^b of k1 (in deviations of p^b a frame) and p^b of k2 in the estimate of frame k1 + `t`, `t` at most N.
+    /// Weights of p^b of k1, v^b of k1 (in deviations of p^b a frame) and p^b of k2 in the estimate
+    /// of frame k1 + `t`, `t` at most N.
     pub fn weights(&self, t: usize) -> [f64; 3] {
         (self.inverse * self.covariances(t)).to_array()
     }
 
-    /// Standard deviation of the error of p^b in frame k1 + `t`, in deviations of p^b: 0 in the keyframes, near 1 far from them.
+    /// Standard deviation of the error of p^b in frame k1 + `t`, in deviations of p^b: 0 in the
+    /// keyframes, near 1 far from them.
     pub fn deviation(&self, t: usize) -> f64 {
         self.left(1.0, self.covariances(t))
     }
 
-    /// That of the step to frame k1 + `t` from the one before, as a share of the deviation of all steps; `t` from 1.
+    /// That of the step to frame k1 + `t` from the one before, as a share of the deviation of all
+    /// steps; `t` from 1.
     pub fn step_deviation(&self, t: usize) -> f64 {
         let step = self.covariances(t) - self.covariances(t - 1);
         self.left(2.0 * (1.0 - likeness(1)), step)
@@ -74,14 +81,16 @@ impl Estimator {
         DVec3::new(likeness(t), step(t), likeness(self.transition - t))
     }
 
-    /// What is left of the deviation of a number of this variance and these covariances with what is given, as a share.
+    /// What is left of the deviation of a number of this variance and these covariances with what
+    /// is given, as a share.
     fn left(&self, variance: f64, covariances: DVec3) -> f64 {
         let known = covariances.dot(self.inverse * covariances);
         (1.0 - known / variance).max(0.0).sqrt()
     }
 }
 
-/// The estimate of a number of p^b, from [`Estimator::weights`] and p^b and v^b of k1 and p^b of k2, in deviations of p^b.
+/// The estimate of a number of p^b, from [`Estimator::weights`] and p^b and v^b of k1 and p^b of
+/// k2, in deviations of p^b.
 pub(super) fn estimate<T: Real>(weights: [T; 3], ends: [T; 3]) -> T {
     weights[0] * ends[0] + weights[1] * ends[1] + weights[2] * ends[2]
 }
@@ -112,7 +121,8 @@ mod tests {
     #[test]
     fn far_from_both_keyframes_little_is_left_of_them() {
         let [first, velocity, last] = Estimator::new(1000).weights(500);
-        // KEPT from two poses that share it; of the first one two frames are known, and count together.
+        // KEPT from two poses that share it; of the first one two frames are known, and count
+        // together.
         for weight in [first, last, -2.0 * velocity] {
             assert!((weight - KEPT / (1.0 + KEPT)).abs() < 2e-3, "{weight}");
         }

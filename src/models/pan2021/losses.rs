@@ -1,8 +1,8 @@
 //! The loss functions, eq. 3 to 11, on standardised predictions.
 //!
-//! Each term is summed over the numbers of a frame and averaged over the N frames and the windows, as the equations print
-//! them. z is a standardised quantity, ~ marks a prediction; s_p and s_v are the root mean squares of the standard deviations of
-//! p^b (cm) and v^b (cm/frame).
+//! Each term is summed over the numbers of a frame and averaged over the N frames and the windows,
+//! as the equations print them. z is a standardised quantity, ~ marks a prediction; s_p and s_v are
+//! the root mean squares of the standard deviations of p^b (cm) and v^b (cm/frame).
 
 use super::config::Pan2021Config;
 use super::units::{Units, VELOCITIES, constant, lengths_of};
@@ -125,7 +125,8 @@ fn reconstruction<T: Real>(
     Ok(sum_of_squares(tape, difference))
 }
 
-/// L_bone, eq. 6: sum over bones of ((length~ - length) / s_p)^2, the length that of keyframe k1; in units of s_p.
+/// L_bone, eq. 6: sum over bones of ((length~ - length) / s_p)^2, the length that of keyframe k1;
+/// in units of s_p.
 fn bone_length<T: Real>(
     tape: &mut Tape<'_, T>,
     units: &Units,
@@ -151,7 +152,8 @@ fn bone_length<T: Real>(
     Ok(sum_of_squares(tape, difference))
 }
 
-/// L_contact, eq. 7: sum over foot joints of c~ |v~| / s_v, with c~ clamped to [0, 1]; in units of s_v.
+/// L_contact, eq. 7: sum over foot joints of c~ |v~| / s_v, with c~ clamped to [0, 1]; in units of
+/// s_v.
 fn contact<T: Real>(
     tape: &mut Tape<'_, T>,
     units: &Units,
@@ -170,7 +172,8 @@ fn contact<T: Real>(
     Ok(tape.affine(sum, 1.0 / units.velocity_scale, 0.0))
 }
 
-/// L_velocity, eq. 8: sum over all joints of |v~_t - (p~_t - p~_{t-1})|^2 / s_v^2; in units of s_v. `velocities` in cm/frame.
+/// L_velocity, eq. 8: sum over all joints of |v~_t - (p~_t - p~_{t-1})|^2 / s_v^2; in units of s_v.
+/// `velocities` in cm/frame.
 fn velocity_consistency<T: Real>(
     tape: &mut Tape<'_, T>,
     units: &Units,
@@ -197,7 +200,8 @@ fn root_smoothness<T: Real>(tape: &mut Tape<'_, T>, frames: &Frames) -> Result<V
 
 /// Weights of frame t (1 .. N after k1) for k1 and k2 in eq. 10.
 ///
-/// In the second case (N <= 2m) the printed weights pull frames near k2 towards k1; the ones here pull to the nearer keyframe.
+/// In the second case (N <= 2m) the printed weights pull frames near k2 towards k1; the ones here
+/// pull to the nearer keyframe.
 fn keyframe_weights(t: usize, transition: usize, m: usize) -> (f64, f64) {
     let n = transition as f64;
     if transition > 2 * m {
@@ -211,7 +215,8 @@ fn keyframe_weights(t: usize, transition: usize, m: usize) -> (f64, f64) {
     }
 }
 
-/// L_key, eq. 10: weighted sums over p^b, p^r of (z~ - z_k1)^2 and (z~ - z_k2)^2; standardised, already the mean over frames.
+/// L_key, eq. 10: weighted sums over p^b, p^r of (z~ - z_k1)^2 and (z~ - z_k2)^2; standardised,
+/// already the mean over frames.
 fn keyframe<T: Real>(
     tape: &mut Tape<'_, T>,
     frames: &Frames,
@@ -244,7 +249,8 @@ fn keyframe<T: Real>(
     Ok(total)
 }
 
-/// L_vfac, eq. 11: sum over the five parts of (z(f~) - z(f^))^2, f~ by eq. 1 from the predicted velocities; standardised.
+/// L_vfac, eq. 11: sum over the five parts of (z(f~) - z(f^))^2, f~ by eq. 1 from the predicted
+/// velocities; standardised.
 fn velocity_factor<T: Real>(
     tape: &mut Tape<'_, T>,
     units: &Units,

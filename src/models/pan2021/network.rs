@@ -322,7 +322,8 @@ impl<T: Real> Rollout<'_, '_, T> {
         }
     }
 
-    /// Frame t + 1 with the control path's corrections of p^b, and their change since frame t in v^b.
+    /// Frame t + 1 with the control path's corrections of p^b, and their change since frame t in
+    /// v^b.
     fn corrected(
         &self,
         tape: &mut Tape<'_, T>,
@@ -366,8 +367,8 @@ impl<T: Real> Rollout<'_, '_, T> {
         tape.concat(&parts)
     }
 
-    /// What a residual is multiplied with in frame t + 1, `[149]`: what the estimate of p^b leaves open, of p^r and o^r the same share;
-    /// of the velocities what that of v^b does; 1 for c.
+    /// What a residual is multiplied with in frame t + 1, `[149]`: what the estimate of p^b leaves
+    /// open, of p^r and o^r the same share; of the velocities what that of v^b does; 1 for c.
     fn open(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         tape.constant_with(&[FRAME], |out| {
             out.fill(T::from_f64(self.estimator.deviation(t + 1)));
@@ -376,8 +377,9 @@ impl<T: Real> Rollout<'_, '_, T> {
         })
     }
 
-    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as [`Estimator`] has it, p^r of the given
-    /// trajectory, o^r linearly between the keyframes; v^b and v^r the differences of these p^b and p^r; c 0, their means.
+    /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as
+    /// [`Estimator`] has it, p^r of the given trajectory, o^r linearly between the keyframes; v^b
+    /// and v^r the differences of these p^b and p^r; c 0, their means.
     fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         let (units, n) = (&self.network.units, self.given.transition);
         let weights = [t, t + 1].map(|t| self.estimator.weights(t).map(T::from_f64));
@@ -407,7 +409,8 @@ impl<T: Real> Rollout<'_, '_, T> {
         })
     }
 
-    /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 - k1) (eq. 2).
+    /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 -
+    /// k1) (eq. 2).
     fn position_code(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
         let root = self.given.constant(tape, t + 1, ROOT_POSITION);
         let arrival = T::from_f64((t + 1) as f64 / self.given.transition as f64);

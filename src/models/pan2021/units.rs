@@ -1,4 +1,5 @@
-//! From standardised numbers to centimetres on the tape: velocity factors, bone vectors, foot velocities.
+//! From standardised numbers to centimetres on the tape: velocity factors, bone vectors, foot
+//! velocities.
 
 use glam::DVec3;
 use ndarray::Array2;
@@ -64,7 +65,8 @@ pub(super) struct Units {
     body_mean: Vec<f64>,
     pub(super) contact_std: Vec<f64>,
     pub(super) contact_mean: Vec<f64>,
-    /// Speeds of joints 1 .. 23 and the root, `[24]`, to standardised velocity factors `[5]` (eq. 1).
+    /// Speeds of joints 1 .. 23 and the root, `[24]`, to standardised velocity factors `[5]` (eq.
+    /// 1).
     factors: Affine,
     /// p^b standardised to the vectors of the 23 bones, `[69]`, cm.
     bones: Affine,
@@ -110,7 +112,8 @@ impl Units {
             .collect()
     }
 
-    /// A standardised velocity of p^b or p^r, `number` 0 to 71, in standard deviations of the position a frame.
+    /// A standardised velocity of p^b or p^r, `number` 0 to 71, in standard deviations of the
+    /// position a frame.
     fn speed<T: Real>(&self, number: usize, standardised: T) -> T {
         let [scale, offset] = self.speed_map(number);
         (standardised - T::from_f64(offset)) / T::from_f64(scale)
@@ -122,13 +125,15 @@ impl Units {
         speed * T::from_f64(scale) + T::from_f64(offset)
     }
 
-    /// Number `number` of p^b of keyframe k1, its velocity there and p^b of k2, in standard deviations of p^b, from their frames.
+    /// Number `number` of p^b of keyframe k1, its velocity there and p^b of k2, in standard
+    /// deviations of p^b, from their frames.
     pub(super) fn ends<T: Real>(&self, number: usize, first: &[T], last: &[T]) -> [T; 3] {
         let speed = self.speed(number, first[VELOCITIES.start + number]);
         [first[number], speed, last[number]]
     }
 
-    /// v^b for changes of p^b a frame, `[rows, 69]`, both standardised: a difference of velocities, so means do not count.
+    /// v^b for changes of p^b a frame, `[rows, 69]`, both standardised: a difference of velocities,
+    /// so means do not count.
     pub(super) fn speed_changes<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -139,7 +144,8 @@ impl Units {
         tape.mul(changes, scales)
     }
 
-    /// Differences of p^b in s_p, the same length for every number, from standardised ones, `[rows, 69]`.
+    /// Differences of p^b in s_p, the same length for every number, from standardised ones,
+    /// `[rows, 69]`.
     pub(super) fn in_scale<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -186,7 +192,8 @@ impl Units {
         self.factors.forward(tape, speeds)
     }
 
-    /// Lengths of the 23 bones, `[rows, 23]`, cm, from standardised p^b `[rows, 69]`; the root is at 0.
+    /// Lengths of the 23 bones, `[rows, 23]`, cm, from standardised p^b `[rows, 69]`; the root is
+    /// at 0.
     pub(super) fn bone_lengths<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,

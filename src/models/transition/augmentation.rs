@@ -9,7 +9,8 @@ use super::{DanceClip, Window};
 use crate::data::{DataConfig, DataError};
 use crate::models::Streams;
 
-/// The forms in which clips are trained, one after the other: all as recorded, in the mirror where those are trained, then the same at each tempo.
+/// The forms in which clips are trained, one after the other: all as recorded, in the mirror where
+/// those are trained, then the same at each tempo.
 pub(super) struct Augmentation {
     /// Recorded clips.
     recorded: usize,
@@ -53,7 +54,8 @@ impl Augmentation {
         self.recorded * self.sides
     }
 
-    /// Draws in which of its clip's forms each window of a step is seen; those of `plan` are of recorded clips, `clips` are in all forms.
+    /// Draws in which of its clip's forms each window of a step is seen; those of `plan` are of
+    /// recorded clips, `clips` are in all forms.
     pub fn vary(&self, plan: &mut StepPlan, clips: &[DanceClip], streams: &Streams, step: u64) {
         let length = plan.length;
         let windows = plan.windows.iter_mut().map(|window| (window, length));
@@ -74,7 +76,8 @@ impl Augmentation {
         }
     }
 
-    /// The window of `length` + 1 frames at about the same place of its clip at the tempo of this number, 0 for the recorded one.
+    /// The window of `length` + 1 frames at about the same place of its clip at the tempo of this
+    /// number, 0 for the recorded one.
     fn at_tempo(&self, window: Window, length: usize, tempo: usize, clips: &[DanceClip]) -> Window {
         let clip = window.clip + self.at_recorded_tempo() * tempo;
         let [recorded, frames] = [window.clip, clip].map(|clip| clips[clip].features.nrows());

@@ -79,8 +79,8 @@ fn motion(request: &Request, transition: Transition) -> Result<Motion, ModelErro
 }
 
 impl TransitionRequest {
-    /// From what is given for F frames: the poses of frame 0 and frame F - 1, trajectory and velocity factors, zeros where none
-    /// are given.
+    /// From what is given for F frames: the poses of frame 0 and frame F - 1, trajectory and
+    /// velocity factors, zeros where none are given.
     ///
     /// # Errors
     /// A pose is missing, or cannot be measured.
@@ -136,7 +136,8 @@ impl TransitionRequest {
     }
 }
 
-/// What a pose by itself tells, `[154]`: its own facing direction, and velocities from the pose before where one is given.
+/// What a pose by itself tells, `[154]`: its own facing direction, and velocities from the pose
+/// before where one is given.
 fn measured(
     request: &Request,
     given: &Given,

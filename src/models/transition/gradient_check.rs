@@ -1,4 +1,5 @@
-//! The gradient of a model's whole loss, end to end through time, against central differences in f64.
+//! The gradient of a model's whole loss, end to end through time, against central differences in
+//! f64.
 
 use ndarray::{Array3, Axis};
 use rand::{RngExt, SeedableRng};
@@ -97,7 +98,8 @@ pub fn check_all(
     Ok(reports.into_iter().flatten().collect())
 }
 
-/// Windows of generated dance, each from a clip of its own, with their poses, and the statistics of those clips.
+/// Windows of generated dance, each from a clip of its own, with their poses, and the statistics of
+/// those clips.
 ///
 /// # Errors
 /// No frames or no windows; more frames than can be generated.
@@ -160,8 +162,9 @@ pub fn generated_windows(
     Ok((batch.features, standardisation))
 }
 
-/// Compares the gradient of a model's total loss with central differences: for critics of their own part of it, for all other
-/// weights of the rest (see [`super::LossTerms::critics`]). None where the model is never fed as the case says.
+/// Compares the gradient of a model's total loss with central differences: for critics of their own
+/// part of it, for all other weights of the rest (see [`super::LossTerms::critics`]). None where
+/// the model is never fed as the case says.
 ///
 /// # Errors
 /// A model that is not trained, or whose settings do not fit together; nothing to check it on.

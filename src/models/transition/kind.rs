@@ -125,7 +125,8 @@ impl ModelConfig {
     /// The network to train, its weights added through `init`.
     ///
     /// # Errors
-    /// A model that is not trained; settings that do not fit together; more weights than `init` allows.
+    /// A model that is not trained; settings that do not fit together; more weights than `init`
+    /// allows.
     pub fn build<T: Real, R: rand::Rng>(
         &self,
         init: &mut Initialiser<'_, T, R>,
@@ -175,8 +176,8 @@ impl ModelConfig {
         }
     }
 
-    /// Whether what its network predicts is brought to the velocity factors that were asked for, see
-    /// [`super::velocity_refinement`].
+    /// Whether what its network predicts is brought to the velocity factors that were asked for,
+    /// see [`super::velocity_refinement`].
     pub fn refines_velocities(&self) -> bool {
         match self {
             Self::Pan2021(config) => config.velocity_refinement,

@@ -1,8 +1,11 @@
-//! Transitions between two keyframes: what Pan et al. 2021, Harvey et al. 2020 and the baselines share.
+//! Transitions between two keyframes: what Pan et al. 2021, Harvey et al. 2020 and the baselines
+//! share.
 //!
-//! - the data: [`DanceClip`]s, their windows, statistics and frames of reference, mirror images and tempi;
+//! - the data: [`DanceClip`]s, their windows, statistics and frames of reference, mirror images and
+//!   tempi;
 //! - [`Network`]: losses and predictions on a tape; [`TrainedModel`]: one with its weights;
-//! - [`TransitionModel`]: what fills a [`TransitionRequest`], as any [`Generator`](crate::models::Generator) may be asked;
+//! - [`TransitionModel`]: what fills a [`TransitionRequest`], as any
+//!   [`Generator`](crate::models::Generator) may be asked;
 //! - [`TransitionTask`]: the curriculum, with scheduled sampling and single frames;
 //! - [`TransitionSettings`], [`ModelConfig`], [`Kind`]: their part of a config.
 

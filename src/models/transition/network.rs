@@ -63,7 +63,8 @@ impl Feed {
     }
 }
 
-/// A trainable network; its weights live in the [`crate::autograd::Parameters`] that it was built with.
+/// A trainable network; its weights live in the [`crate::autograd::Parameters`] that it was built
+/// with.
 pub trait Network<T: Real>: Send + Sync {
     /// Whether its batches need [`Batch::poses`].
     fn reads_poses(&self) -> bool {
@@ -75,7 +76,8 @@ pub trait Network<T: Real>: Send + Sync {
         0
     }
 
-    /// The group of learning rates that a parameter belongs to, see [`crate::optim::AdamConfig::rates`].
+    /// The group of learning rates that a parameter belongs to, see
+    /// [`crate::optim::AdamConfig::rates`].
     fn rate_group(&self, _parameter: &str) -> Option<&'static str> {
         None
     }
@@ -90,7 +92,8 @@ pub trait Network<T: Real>: Send + Sync {
         drawn
     }
 
-    /// Loss terms of a batch, divided by its `total_windows` (or `total_single_frames`), so that the terms of the shards add up to the batch's.
+    /// Loss terms of a batch, divided by its `total_windows` (or `total_single_frames`), so that
+    /// the terms of the shards add up to the batch's.
     ///
     /// # Errors
     /// Features that do not fit the network.
@@ -101,8 +104,9 @@ pub trait Network<T: Real>: Send + Sync {
         feed: Feed,
     ) -> Result<LossTerms, AutogradError>;
 
-    /// Predicts frames k1 + 1 .. k2 from row 0 (all of it), row N (keyframe) and, of the other rows, the root trajectory and
-    /// the velocity factors only: standardised `[N, windows, 149]`. The tape computes only, without dropout.
+    /// Predicts frames k1 + 1 .. k2 from row 0 (all of it), row N (keyframe) and, of the other
+    /// rows, the root trajectory and the velocity factors only: standardised `[N, windows, 149]`.
+    /// The tape computes only, without dropout.
     ///
     /// # Errors
     /// Features that do not fit the network.

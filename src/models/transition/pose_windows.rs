@@ -1,4 +1,5 @@
-//! Windows as joint rotations and bone offsets: what networks with quaternion output read beside the features.
+//! Windows as joint rotations and bone offsets: what networks with quaternion output read beside
+//! the features.
 
 use ndarray::{Array2, Array3};
 
@@ -13,11 +14,12 @@ pub const OFFSETS: usize = 3 * JOINTS;
 /// The poses of windows of one length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseWindows<T> {
-    /// Local rotations of the 24 joints, `[N + 1, windows, 96]`: quaternions (x, y, z, w), the root's in the world. Along a window the
-    /// signs are those that make a quaternion the nearer of two to the one before. Rows that are not given are 0.
+    /// Local rotations of the 24 joints, `[N + 1, windows, 96]`: quaternions (x, y, z, w), the
+    /// root's in the world. Along a window the signs are those that make a quaternion the nearer of
+    /// two to the one before. Rows that are not given are 0.
     pub rotations: Array3<T>,
-    /// Translations of the joints in their parents' frames, `[windows, 72]`, cm: those of the window's first frame, and 0 for the
-    /// root.
+    /// Translations of the joints in their parents' frames, `[windows, 72]`, cm: those of the
+    /// window's first frame, and 0 for the root.
     pub offsets: Array2<T>,
 }
 
@@ -30,7 +32,8 @@ impl<T: Real> PoseWindows<T> {
         }
     }
 
-    /// Writes poses on the dance skeleton into a window: those of the frames `rows`, in the order of time.
+    /// Writes poses on the dance skeleton into a window: those of the frames `rows`, in the order
+    /// of time.
     pub fn write<'p>(
         &mut self,
         window: usize,

@@ -10,14 +10,16 @@ use crate::motion::placement::world_positions;
 
 /// The 149 numbers of frames k1 + 1 .. k2, `[N, 149]`, not standardised.
 ///
-/// `start` and `target`: features of the keyframes, of which o^r is read of k2 and all 149 numbers of k1. `world`: world positions of
-/// the 24 joints in each predicted frame, `[N][24]`, cm. `contacts`: labels, `[N, 4]`.
+/// `start` and `target`: features of the keyframes, of which o^r is read of k2 and all 149 numbers
+/// of k1. `world`: world positions of the 24 joints in each predicted frame, `[N][24]`, cm.
+/// `contacts`: labels, `[N, 4]`.
 ///
-/// A frame's facing angle is that of its own joints, smoothed over time with standard deviation `sigma` (frames) and joined to the
-/// keyframes' known angles, see [`facing_angles_between`]. The recorded angles that p^b is turned by are smoothed over the whole
-/// clip. Where the predicted poses are the recorded ones, p^b so comes within an LRP of 0.4, 1.3, 4.6, 3.4 and 2.3 cm of the
-/// recorded p^b at N = 5, 10, 50, 100 and 150 (training clips of the dance data; 36 to 7 cm at N = 10 to 150 if the window were
-/// smoothed by itself).
+/// A frame's facing angle is that of its own joints, smoothed over time with standard deviation
+/// `sigma` (frames) and joined to the keyframes' known angles, see [`facing_angles_between`]. The
+/// recorded angles that p^b is turned by are smoothed over the whole clip. Where the predicted
+/// poses are the recorded ones, p^b so comes within an LRP of 0.4, 1.3, 4.6, 3.4 and 2.3 cm of the
+/// recorded p^b at N = 5, 10, 50, 100 and 150 (training clips of the dance data; 36 to 7 cm at N =
+/// 10 to 150 if the window were smoothed by itself).
 pub(crate) fn posed_frames(
     [start, target]: [ArrayView1<f64>; 2],
     world: &[Vec<DVec3>],

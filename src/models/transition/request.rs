@@ -18,7 +18,8 @@ pub struct KeyframePose {
 
 /// A transition to be filled: two keyframes and the two conditions on the frames between them.
 ///
-/// N is the number of frames from keyframe k1 to keyframe k2 (`k2 - k1`); row 0 of a condition belongs to k1, row N to k2.
+/// N is the number of frames from keyframe k1 to keyframe k2 (`k2 - k1`); row 0 of a condition
+/// belongs to k1, row N to k2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransitionRequest {
     /// The dance skeleton with the dancer's own bone lengths.
@@ -43,9 +44,9 @@ impl TransitionRequest {
     ///
     /// # Errors
     ///
-    /// [`ModelError::Skeleton`] where the skeleton is not the dance skeleton, [`ModelError::Shape`] where an array has
-    /// another shape than documented, [`ModelError::NoFrames`] where N is 0, [`ModelError::NotFinite`] where a number is NaN
-    /// or infinite.
+    /// [`ModelError::Skeleton`] where the skeleton is not the dance skeleton, [`ModelError::Shape`]
+    /// where an array has another shape than documented, [`ModelError::NoFrames`] where N is 0,
+    /// [`ModelError::NotFinite`] where a number is NaN or infinite.
     pub fn check(&self) -> Result<(), ModelError> {
         if !self.skeleton.is_dance_skeleton() {
             return Err(ModelError::Skeleton {
@@ -103,7 +104,8 @@ fn shape(what: String, expected: &[usize], found: &[usize]) -> ModelError {
 /// The frames a model predicted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
-    /// Frames k1 + 1 .. k2, `[N, 149]`: p^b, p^r, o^r, c, v^b, v^r, not standardised (cm, rad, cm/frame).
+    /// Frames k1 + 1 .. k2, `[N, 149]`: p^b, p^r, o^r, c, v^b, v^r, not standardised (cm, rad,
+    /// cm/frame).
     pub frames: Array2<f64>,
 }
 
@@ -151,8 +153,8 @@ pub trait TransitionModel: Send + Sync {
 
     /// Predicts the frames k1 + 1 .. k2 of every request, in the order of the requests.
     ///
-    /// The result for a request depends on that request alone, not on the others of the call; requests of one call may differ in
-    /// length.
+    /// The result for a request depends on that request alone, not on the others of the call;
+    /// requests of one call may differ in length.
     ///
     /// # Errors
     ///

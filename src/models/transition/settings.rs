@@ -1,4 +1,5 @@
-//! What a config says of a transition model beside what all experiments have. The defaults are those of Pan et al. 2021.
+//! What a config says of a transition model beside what all experiments have. The defaults are
+//! those of Pan et al. 2021.
 
 use serde::{Deserialize, Serialize};
 use toml::Table;
@@ -34,8 +35,8 @@ pub struct TransitionSettings {
     pub scheduled_sampling: ScheduledSamplingConfig,
 }
 
-/// The curriculum: in epoch e (from 0) every transition length from
-/// `min(min_len + min_len_step floor(e / min_len_every), max_len)` to `min(min_len + max_len_step e, max_len)` frames.
+/// The curriculum: in epoch e (from 0) every transition length from `min(min_len + min_len_step
+/// floor(e / min_len_every), max_len)` to `min(min_len + max_len_step e, max_len)` frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScheduleConfig {
@@ -51,10 +52,11 @@ pub struct ScheduleConfig {
     pub min_len_every: usize,
     /// Most windows in a batch.
     pub batch_size: usize,
-    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not on the number of threads.
+    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not
+    /// on the number of threads.
     pub shards: usize,
-    /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths of every epoch, below 1 in
-    /// whole batches, see [`super::Schedule::new`].
+    /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths
+    /// of every epoch, below 1 in whole batches, see [`super::Schedule::new`].
     pub fraction: f64,
 }
 
@@ -78,12 +80,14 @@ impl Default for ScheduleConfig {
 #[serde(default, deny_unknown_fields)]
 pub struct AugmentationConfig {
     /// Each window that is trained is with probability 1/2 the one that a mirror shows, see
-    /// [`crate::motion::mirror_image`]; the statistics of the data are over the clips and their images.
+    /// [`crate::motion::mirror_image`]; the statistics of the data are over the clips and their
+    /// images.
     pub mirror: bool,
-    /// Each window that is trained is, with the same probability, of the recorded clip or of the same clip at one of these
-    /// tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`]; of the recorded one where it would be too long for
-    /// that at this tempo. The statistics of the data leave them out. 16 at most, each from 0.25 to 4; at each, the training
-    /// clips are in memory once more.
+    /// Each window that is trained is, with the same probability, of the recorded clip or of the
+    /// same clip at one of these tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`];
+    /// of the recorded one where it would be too long for that at this tempo. The statistics of the
+    /// data leave them out. 16 at most, each from 0.25 to 4; at each, the training clips are in
+    /// memory once more.
     pub tempi: Vec<f64>,
 }
 

@@ -17,10 +17,12 @@ pub(super) struct SingleFramePlan {
     pub frame: usize,
 }
 
-/// Draws `count` of them from clips of these numbers of frames, every frame of a clip as likely as another.
+/// Draws `count` of them from clips of these numbers of frames, every frame of a clip as likely as
+/// another.
 ///
-/// The logarithm of a window's length is uniform, so that frames near keyframes are as frequent as frames far from both; a clip that is too
-/// short for the length is taken whole. Clips of one frame have none.
+/// The logarithm of a window's length is uniform, so that frames near keyframes are as frequent as
+/// frames far from both; a clip that is too short for the length is taken whole. Clips of one frame
+/// have none.
 pub(super) fn draw(
     clip_frames: &[usize],
     count: usize,

@@ -8,7 +8,8 @@ use crate::models::Statistics;
 use crate::models::weights::{SavedWeights, WeightsError};
 use crate::motion::features::{BODY_POSITIONS, BODY_VELOCITIES, FACING, FEATURES};
 
-/// A standard deviation below this, in the feature's unit, counts as 1: a number that never changes is only centred.
+/// A standard deviation below this, in the feature's unit, counts as 1: a number that never changes
+/// is only centred.
 pub(crate) const SMALLEST_STD: f64 = 1e-4;
 /// Names of its arrays in a weights file.
 const MEAN: &str = "feature_mean";
@@ -16,7 +17,8 @@ const STD: &str = "feature_std";
 const POSITION_SCALE: &str = "position_scale";
 const VELOCITY_SCALE: &str = "velocity_scale";
 
-/// Mean and standard deviation of the 154 numbers of a frame, and the scales of the losses that are not standardised.
+/// Mean and standard deviation of the 154 numbers of a frame, and the scales of the losses that are
+/// not standardised.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Standardisation {
@@ -31,10 +33,12 @@ pub struct Standardisation {
 }
 
 impl Standardisation {
-    /// Statistics over all frames of the training clips, each `[frames, 154]`, every frame counting the same.
+    /// Statistics over all frames of the training clips, each `[frames, 154]`, every frame counting
+    /// the same.
     ///
-    /// The facing angle is measured in [-pi, pi), as at the start of a window: unwrapped along a clip it counts the turns that
-    /// the dancer has made, which no window shows. No frames give mean 0 and deviation 1.
+    /// The facing angle is measured in [-pi, pi), as at the start of a window: unwrapped along a
+    /// clip it counts the turns that the dancer has made, which no window shows. No frames give
+    /// mean 0 and deviation 1.
     pub fn fit<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Self {
         let frames: usize = clips.clone().into_iter().map(|clip| clip.nrows()).sum();
         let count = frames.max(1) as f64;
@@ -94,8 +98,8 @@ impl Standardisation {
         })
     }
 
-    /// As what is saved beside the weights: `feature_mean [154]`, `feature_std [154]`, `position_scale [1]`,
-    /// `velocity_scale [1]`.
+    /// As what is saved beside the weights: `feature_mean [154]`, `feature_std [154]`,
+    /// `position_scale [1]`, `velocity_scale [1]`.
     pub fn statistics(&self) -> Statistics {
         let array = |values: &[f64]| Array1::from(values.to_vec()).into_dyn();
         Statistics::default()

@@ -1,4 +1,5 @@
-//! The training of a transition network: a curriculum of windows, scheduled sampling, single frames beside them.
+//! The training of a transition network: a curriculum of windows, scheduled sampling, single frames
+//! beside them.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -36,7 +37,8 @@ impl TransitionTask {
     /// The training of the network that `build` makes from the statistics of the training clips.
     ///
     /// # Errors
-    /// Clips that are too short for the schedule or cannot be measured in another form; a network that cannot be built.
+    /// Clips that are too short for the schedule or cannot be measured in another form; a network
+    /// that cannot be built.
     pub fn new(
         settings: &TransitionSettings,
         setting: &TaskSetting<'_>,
@@ -101,7 +103,8 @@ impl TransitionTask {
         }
     }
 
-    /// A batch of the schedule with the single frames of its step, all these windows in a form that `[augmentation]` allows.
+    /// A batch of the schedule with the single frames of its step, all these windows in a form that
+    /// `[augmentation]` allows.
     fn plan(&self, batch: &BatchPlan, step: u64) -> StepPlan {
         let count = self.network.single_frames();
         let mut plan = StepPlan {

@@ -27,7 +27,8 @@ pub struct TrainedModel {
 }
 
 impl TrainedModel {
-    /// `parameters` are those that `network` was built with, `standardisation` and `root_frame` those that it was trained in.
+    /// `parameters` are those that `network` was built with, `standardisation` and `root_frame`
+    /// those that it was trained in.
     pub fn new(
         name: String,
         network: impl Into<Arc<dyn Network<f32>>>,
@@ -46,7 +47,8 @@ impl TrainedModel {
         }
     }
 
-    /// The same model, with its predictions brought to the velocity factors that were asked for or as the network gives them.
+    /// The same model, with its predictions brought to the velocity factors that were asked for or
+    /// as the network gives them.
     pub fn refining_velocities(self, refining: bool) -> Self {
         Self {
             refines_velocities: refining,
@@ -75,8 +77,8 @@ impl TrainedModel {
         self.root_frame.of_window(first.view())
     }
 
-    /// The network's inputs for requests of one length: features `[N + 1, windows, 154]`, standardised, and the keyframes' poses where
-    /// the network reads them; what is not given is 0.
+    /// The network's inputs for requests of one length: features `[N + 1, windows, 154]`,
+    /// standardised, and the keyframes' poses where the network reads them; what is not given is 0.
     fn inputs(&self, requests: &[&TransitionRequest], length: usize) -> Batch<f32> {
         let mut features = Array3::zeros((length + 1, requests.len(), FEATURES));
         for (window, request) in requests.iter().enumerate() {

@@ -18,7 +18,8 @@ pub struct Windows {
     pub skipped: Vec<usize>,
 }
 
-/// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every ceil(0.1 (N + 1)) frames.
+/// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every
+/// ceil(0.1 (N + 1)) frames.
 pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
     let length = transition + 1;
     let stride = length.div_ceil(10);
@@ -37,44 +38,4 @@ pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
         }
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_stride_is_the_tenth_of_the_window_rounded_up() {
-        for (transition, stride) in [
-            (5, 1),
-            (9, 1),
-            (10, 2),
-            (50, 6),
-            (99, 10),
-            (100, 11),
-            (150, 16),
-        ] {
-            assert_eq!(
-                windows(&[1000], transition).windows[1].start,
-                stride,
-                "N = {transition}"
-            );
-        }
-    }
-
-    #[test]
-    fn the_last_window_fits_and_no_further_one_would() {
-        let found = windows(&[23, 11, 10], 10);
-        let starts = |clip| {
-            found
-                .windows
-                .iter()
-                .filter(|w| w.clip == clip)
-                .map(|w| w.start)
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(starts(0), [0, 2, 4, 6, 8, 10, 12]);
-        assert_eq!(starts(1), [0]);
-        assert_eq!(found.skipped, [2]);
-    }
 }

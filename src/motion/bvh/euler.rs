@@ -6,11 +6,13 @@ use glam::{DMat3, DQuat};
 
 use super::document::Axis;
 
-/// Angles in degrees with `rotation = R_a(angles[0]) R_b(angles[1]) R_c(angles[2])` for three different axes a, b, c.
+/// Angles in degrees with `rotation = R_a(angles[0]) R_b(angles[1]) R_c(angles[2])` for three
+/// different axes a, b, c.
 ///
-/// Of the two solutions and their turns, the one nearest to `previous`, so that a channel does not jump by 360 from a frame to the next.
-/// Without a previous frame the middle angle lies in [-90, 90] and the others in [-180, 180]. Where the middle angle is +-90 and only the
-/// sum of the others counts, the last keeps its previous value.
+/// Of the two solutions and their turns, the one nearest to `previous`, so that a channel does not
+/// jump by 360 from a frame to the next. Without a previous frame the middle angle lies in [-90,
+/// 90] and the others in [-180, 180]. Where the middle angle is +-90 and only the sum of the others
+/// counts, the last keeps its previous value.
 pub(super) fn euler_angles(
     rotation: DQuat,
     order: [Axis; 3],
@@ -29,7 +31,8 @@ pub(super) fn euler_angles(
         previous.map_or(0.0, |angles| angles[2])
     };
     let middle = (sign * at(&matrix, a, c)).atan2(flat);
-    // The first angle from what is left of the rotation without the last: an inaccurate last angle near +-90 is made up for.
+    // The first angle from what is left of the rotation without the last: an inaccurate last angle
+    // near +-90 is made up for.
     let rest = DMat3::from_quat(rotation * DQuat::from_axis_angle(glam::DVec3::AXES[c], -last));
     let first = (sign * at(&rest, c, b)).atan2(at(&rest, b, b));
     let solutions = [[first, middle, last], [first + PI, PI - middle, last + PI]];

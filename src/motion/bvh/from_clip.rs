@@ -13,8 +13,9 @@ const STILL: f64 = 1e-6;
 /// A joint without rotation channels may be turned by no more than this, rad.
 const UNTURNED: f64 = 1e-6;
 
-/// Channels that hold a clip's motion: three rotations a joint in the order `order` (three different axes), and three positions before them for the
-/// root and for every joint that moves in its parent's frame. `[joints]`.
+/// Channels that hold a clip's motion: three rotations a joint in the order `order` (three
+/// different axes), and three positions before them for the root and for every joint that moves in
+/// its parent's frame. `[joints]`.
 pub fn channel_layout(clip: &Clip, order: [Axis; 3]) -> Vec<Vec<Channel>> {
     let positions = [Axis::X, Axis::Y, Axis::Z].map(Channel::Position);
     clip.skeleton
@@ -31,11 +32,12 @@ pub fn channel_layout(clip: &Clip, order: [Axis; 3]) -> Vec<Vec<Channel>> {
 }
 
 impl Bvh {
-    /// A clip as a document with these channels for each joint, `[joints]`: no rotation or three, any positions, in any order.
-    /// [`channel_layout`] gives channels that fit.
+    /// A clip as a document with these channels for each joint, `[joints]`: no rotation or three,
+    /// any positions, in any order. [`channel_layout`] gives channels that fit.
     ///
     /// # Errors
-    /// The channels cannot hold the motion (the error names joint and frame), or the clip could not be read back from a file.
+    /// The channels cannot hold the motion (the error names joint and frame), or the clip could not
+    /// be read back from a file.
     pub fn from_clip(clip: &Clip, channels: Vec<Vec<Channel>>) -> Result<Self, BvhError> {
         let fault = |fault: String| BvhError::Document {
             name: clip.name.clone(),

@@ -1,4 +1,5 @@
-//! The HIERARCHY section. Open blocks are kept on a stack of our own, so deep nesting cannot overflow the thread's.
+//! The HIERARCHY section. Open blocks are kept on a stack of our own, so deep nesting cannot
+//! overflow the thread's.
 
 use std::collections::HashMap;
 

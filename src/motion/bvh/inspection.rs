@@ -4,7 +4,8 @@ use std::fmt;
 
 use super::Bvh;
 
-/// A document whose `Display` says its frames, rate, duration, channels, the range of root heights, and its hierarchy.
+/// A document whose `Display` says its frames, rate, duration, channels, the range of root heights,
+/// and its hierarchy.
 pub struct Inspection<'a>(pub &'a Bvh);
 
 impl fmt::Display for Inspection<'_> {

@@ -1,7 +1,8 @@
 //! BVH files: the document, its reader and its writer, and the way to clips and back.
 //!
-//! Rotations are composed in the order of a joint's channels, the first listed outermost: `Zrotation Xrotation Yrotation` means
-//! `R = Rz Rx Ry`, degrees. A position channel replaces its part of the joint's offset.
+//! Rotations are composed in the order of a joint's channels, the first listed outermost:
+//! `Zrotation Xrotation Yrotation` means `R = Rz Rx Ry`, degrees. A position channel replaces its
+//! part of the joint's offset.
 
 mod document;
 mod error;

@@ -6,7 +6,8 @@ use super::document::LONGEST_FRAME;
 use super::error::BvhError;
 use super::scanner::{Scanner, quoted};
 
-/// Reads what follows the word MOTION: the frame time in seconds and the rows, `[frames, channels]`.
+/// Reads what follows the word MOTION: the frame time in seconds and the rows,
+/// `[frames, channels]`.
 pub(super) fn motion(
     scanner: &mut Scanner,
     channels: usize,

@@ -19,7 +19,8 @@ pub fn write(path: &Path, document: &Bvh) -> Result<(), BvhError> {
 }
 
 impl Bvh {
-    /// The document as the text of a BVH file. Joints are written depth first, whatever their order in the skeleton.
+    /// The document as the text of a BVH file. Joints are written depth first, whatever their order
+    /// in the skeleton.
     pub fn to_text(&self) -> String {
         let order = self.depth_first();
         let mut text = String::from("HIERARCHY\n");

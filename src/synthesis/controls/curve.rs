@@ -10,15 +10,17 @@ const STEPS: usize = 64;
 pub enum Speed {
     /// The same all the way.
     Constant,
-    /// In proportion to these speeds, one for each step from a frame to the next (cm/frame or any other unit). All
-    /// zero counts as constant, and so does another number of them.
+    /// In proportion to these speeds, one for each step from a frame to the next (cm/frame or any
+    /// other unit). All zero counts as constant, and so does another number of them.
     Like(Vec<f64>),
 }
 
-/// A centripetal Catmull-Rom spline through `points` (cm) as a path of `frames` frames, from the first point to the last.
+/// A centripetal Catmull-Rom spline through `points` (cm) as a path of `frames` frames, from the
+/// first point to the last.
 ///
-/// Centripetal (Yuksel et al. 2011, alpha = 0.5): it has no loops or cusps between points at unlike distances. Points that repeat the one before are left
-/// out. One point gives a root that stands still.
+/// Centripetal (Yuksel et al. 2011, alpha = 0.5): it has no loops or cusps between points at unlike
+/// distances. Points that repeat the one before are left out. One point gives a root that stands
+/// still.
 pub fn smooth_curve(points: &[DVec3], frames: usize, speed: &Speed) -> Vec<DVec3> {
     let mut distinct: Vec<DVec3> = Vec::with_capacity(points.len());
     for &point in points {
@@ -44,9 +46,11 @@ pub fn smooth_curve(points: &[DVec3], frames: usize, speed: &Speed) -> Vec<DVec3
         .collect()
 }
 
-/// A smooth path through `points` (cm) that is at each of them at its time, ascending from 0; one point a frame up to the last time.
+/// A smooth path through `points` (cm) that is at each of them at its time, ascending from 0; one
+/// point a frame up to the last time.
 ///
-/// Cubic between neighbours, with the velocity at each point that a parabola through it and its neighbours has there.
+/// Cubic between neighbours, with the velocity at each point that a parabola through it and its
+/// neighbours has there.
 pub(crate) fn timed_curve(times: &[usize], points: &[DVec3]) -> Vec<DVec3> {
     let slope = |k: usize| (points[k + 1] - points[k]) / (times[k + 1] - times[k]) as f64;
     let last = points.len() - 1;
@@ -111,7 +115,8 @@ fn along(fine: &[DVec3], reached: &[f64], distance: f64) -> DVec3 {
     fine[after - 1].lerp(fine[after], share)
 }
 
-/// The spline as a fine polyline; before the first and after the last point stands its mirror image.
+/// The spline as a fine polyline; before the first and after the last point stands its mirror
+/// image.
 fn sampled(points: &[DVec3]) -> Vec<DVec3> {
     let last = points.len() - 1;
     let mut padded = vec![2.0 * points[0] - points[1]];

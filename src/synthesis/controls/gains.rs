@@ -50,33 +50,3 @@ impl FromStr for Gains {
         Ok(Self(gains.map(|gain| gain.or(all).unwrap_or(1.0))))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn constants_hold_for_all_parts_or_for_named_ones() {
-        assert_eq!(Gains::from_str("0.5"), Ok(Gains([0.5; 5])));
-        assert_eq!(
-            Gains::from_str("right_arm=1.5, left_leg=2"),
-            Ok(Gains([1.0, 2.0, 1.0, 1.5, 1.0]))
-        );
-        assert_eq!(
-            Gains::from_str("0.5,trunk=1"),
-            Ok(Gains([1.0, 0.5, 0.5, 0.5, 0.5]))
-        );
-        for (bad, message) in [
-            ("", "expected a number"),
-            ("fast", "expected a number"),
-            ("-1", "expected a number"),
-            ("head=2", "\"head\" is no part of the body; parts: trunk"),
-            ("trunk=x", "expected a number"),
-            ("trunk=1,trunk=2", "twice"),
-            ("1,2", "already"),
-        ] {
-            let error = Gains::from_str(bad).unwrap_err();
-            assert!(error.contains(message), "{bad}: {error}");
-        }
-    }
-}

@@ -1,7 +1,9 @@
-//! What a person changes about a sequence: where its root goes, when its keyframes stand, how fast the parts of the body move.
+//! What a person changes about a sequence: where its root goes, when its keyframes stand, how fast
+//! the parts of the body move.
 //!
-//! Every control is a method of [`SequenceRequest`] that takes a request and gives another, so they combine in any order that makes
-//! sense: times first, then another trajectory, then turns, scales and heights, then velocity factors.
+//! Every control is a method of [`SequenceRequest`] that takes a request and gives another, so they
+//! combine in any order that makes sense: times first, then another trajectory, then turns, scales
+//! and heights, then velocity factors.
 
 mod csv;
 mod curve;
@@ -23,7 +25,8 @@ use ndarray::{Array2, ArrayView2};
 #[cfg(doc)]
 use super::SequenceRequest;
 
-/// The row at a time between rows, by a Catmull-Rom spline through all of them with equal steps; the ends are held.
+/// The row at a time between rows, by a Catmull-Rom spline through all of them with equal steps;
+/// the ends are held.
 fn row_at(rows: ArrayView2<f64>, time: f64) -> Vec<f64> {
     let last = rows.nrows() - 1;
     let before = (time.max(0.0) as usize).min(last);

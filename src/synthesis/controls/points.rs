@@ -101,28 +101,3 @@ impl SequenceRequest {
         )
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_have_two_or_three_numbers_each() {
-        let flat = Points::from_str("0,0; -10.5,20;30,40").unwrap();
-        assert_eq!(flat.points[1], DVec3::new(-10.5, 0.0, 20.0));
-        assert!(!flat.with_heights);
-        assert!(Points::from_str("0,90,0;1,91,2").unwrap().with_heights);
-        for (bad, message) in [
-            ("", "\"\" is no number"),
-            ("1,2", "two points"),
-            ("1,2;3", "another count"),
-            ("1;2", "expected x,z"),
-            ("1,2;x,3", "point 2: \"x\""),
-            ("1,2;nan,3", "point 2: nan"),
-            ("1,2;1e9,3", "1000000"),
-        ] {
-            let error = Points::from_str(bad).unwrap_err();
-            assert!(error.contains(message), "{bad}: {error}");
-        }
-    }
-}

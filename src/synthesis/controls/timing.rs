@@ -7,10 +7,12 @@ use crate::synthesis::request::check_times;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 impl SequenceRequest {
-    /// The same keyframes at other frames of the result; the controls between them are stretched along.
+    /// The same keyframes at other frames of the result; the controls between them are stretched
+    /// along.
     ///
-    /// The root goes the same way in more or less time. Velocity factors keep their values, so a longer transition is filled with more
-    /// movement at the same speeds, as in the paper's figure 10, not with slower movement.
+    /// The root goes the same way in more or less time. Velocity factors keep their values, so a
+    /// longer transition is filled with more movement at the same speeds, as in the paper's figure
+    /// 10, not with slower movement.
     ///
     /// # Errors
     /// Not one time a keyframe, or times that do not ascend from 0.

@@ -13,8 +13,8 @@ use crate::synthesis::retarget::move_root;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 impl SequenceRequest {
-    /// The same on another root trajectory, `[F, 3]`, cm: every keyframe's root is moved onto it, its pose and direction unchanged.
-    /// Also how far each keyframe was moved, cm.
+    /// The same on another root trajectory, `[F, 3]`, cm: every keyframe's root is moved onto it,
+    /// its pose and direction unchanged. Also how far each keyframe was moved, cm.
     ///
     /// # Errors
     /// A trajectory with another number of rows than F, or other than three columns.
@@ -33,7 +33,8 @@ impl SequenceRequest {
         Ok((self, moved))
     }
 
-    /// Turned by `angle` (rad) about the vertical through the first keyframe's root: trajectory and keyframes together.
+    /// Turned by `angle` (rad) about the vertical through the first keyframe's root: trajectory and
+    /// keyframes together.
     pub fn turned(mut self, angle: f64) -> Self {
         let turn = DQuat::from_rotation_y(angle);
         let centre = self.centre();
@@ -54,7 +55,8 @@ impl SequenceRequest {
         self
     }
 
-    /// The trajectory `scale` times as large in x and z, from the first keyframe's root on; heights stay. Keyframes go with it.
+    /// The trajectory `scale` times as large in x and z, from the first keyframe's root on; heights
+    /// stay. Keyframes go with it.
     ///
     /// # Errors
     /// A scale that is not a positive number.
@@ -82,9 +84,9 @@ impl SequenceRequest {
         Ok(self)
     }
 
-    /// The trajectory raised (or, below 0, lowered) between the keyframes: by `height` (cm) halfway, by nothing at the keyframes, along
-    /// a cosine. So the keyframes keep their feet on the floor, and the root asks for a jump or a squat on the way, as in the
-    /// paper's figure 6.
+    /// The trajectory raised (or, below 0, lowered) between the keyframes: by `height` (cm)
+    /// halfway, by nothing at the keyframes, along a cosine. So the keyframes keep their feet on
+    /// the floor, and the root asks for a jump or a squat on the way, as in the paper's figure 6.
     pub fn raised(mut self, height: f64) -> Self {
         let times = self.times();
         for pair in times.windows(2) {

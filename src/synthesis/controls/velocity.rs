@@ -37,7 +37,8 @@ impl SequenceRequest {
         Ok(self)
     }
 
-    /// Velocity factors that go evenly from each keyframe's own to the next one's, `[F, 5]`, cm/frame.
+    /// Velocity factors that go evenly from each keyframe's own to the next one's, `[F, 5]`,
+    /// cm/frame.
     pub fn velocity_between_keyframes(&self) -> Array2<f64> {
         let mut factors = Array2::zeros((self.frames(), PARTS));
         for pair in self.keyframes.windows(2) {

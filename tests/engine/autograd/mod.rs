@@ -3,5 +3,6 @@
 mod errors;
 mod extremes;
 mod fused;
+mod kernels;
 mod tape;
 mod weights;

@@ -9,7 +9,8 @@ use crate::data::choreography::upper_body::ArmPose;
 /// What the rest of the body does, for the arms to follow.
 #[derive(Debug, Clone, Copy)]
 pub enum Cue {
-    /// Travel in this direction (forward, left), this many beats a step; the side (+1 left) of the foot that steps first.
+    /// Travel in this direction (forward, left), this many beats a step; the side (+1 left) of the
+    /// foot that steps first.
     Travel {
         forward: f64,
         left: f64,
@@ -44,7 +45,8 @@ enum ArmFigure {
 /// Frames that one arm figure takes at most; longer cues get several, to alternate sides.
 const LONGEST: f64 = 44.0;
 
-/// Writes arms over the next `beats`: by the style's coupling those that belong to the cue, else drawn freely.
+/// Writes arms over the next `beats`: by the style's coupling those that belong to the cue, else
+/// drawn freely.
 pub fn accompany(score: &mut Score, beats: f64, cue: Cue, rng: &mut ChaCha12Rng) {
     let figure = if rng.random_bool(score.style.coupling) {
         of_cue(cue, score.style.name)

@@ -1,4 +1,5 @@
-//! Leg gestures over one planted foot: kicks and unfoldings in three directions, and pointing the foot along the floor.
+//! Leg gestures over one planted foot: kicks and unfoldings in three directions, and pointing the
+//! foot along the floor.
 
 use glam::DVec3;
 use rand::RngExt;
@@ -18,7 +19,8 @@ pub fn perform(score: &mut Score, rng: &mut ChaCha12Rng) {
     }
 }
 
-/// Where the ball of the foot is with the leg raised by `angle` (rad) from hanging towards (forward, left), `length` cm long.
+/// Where the ball of the foot is with the leg raised by `angle` (rad) from hanging towards
+/// (forward, left), `length` cm long.
 fn raised(score: &Score, foot: Foot, way: (f64, f64), angle: f64, length: f64) -> DVec3 {
     let stance = score.feet[foot.other().index()].placement();
     let under = 0.75 * (stance.ball - score.centre) + score.centre;

@@ -1,4 +1,5 @@
-//! Figures: what a dancer does for a bar or so. Each family is one file; arms and trunk come with them.
+//! Figures: what a dancer does for a bar or so. Each family is one file; arms and trunk come with
+//! them.
 
 mod arms;
 mod gestures;
@@ -46,10 +47,12 @@ pub fn return_to_the_middle(score: &mut Score, rng: &mut ChaCha12Rng) {
     steps::walk(score, rng);
 }
 
-/// Distance (cm) from the middle of the floor over which going on outwards becomes three times less likely.
+/// Distance (cm) from the middle of the floor over which going on outwards becomes three times less
+/// likely.
 const ROOM: f64 = 75.0;
 
-/// Draws one of the directions (forward, left: shares of `distance` cm), rather those that stay near the middle of the floor.
+/// Draws one of the directions (forward, left: shares of `distance` cm), rather those that stay
+/// near the middle of the floor.
 fn draw_direction(
     score: &Score,
     directions: &[(f64, f64)],

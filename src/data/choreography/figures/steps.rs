@@ -118,7 +118,8 @@ fn side_steps(score: &mut Score, rng: &mut ChaCha12Rng) {
     score.advance(4.0);
 }
 
-/// Forward or back, side, close; rising on the second step and falling at the end, perhaps with a quarter turn.
+/// Forward or back, side, close; rising on the second step and falling at the end, perhaps with a
+/// quarter turn.
 fn walk_box(score: &mut Score, rng: &mut ChaCha12Rng) {
     let length = 0.8 * score.style.step;
     let (forward, _) = draw_direction(score, &[(1.0, 0.0), (-1.0, 0.0)], length, rng);

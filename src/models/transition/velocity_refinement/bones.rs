@@ -25,7 +25,8 @@ fn length(bone: [f64; 3]) -> f64 {
     bone.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The lengths that bones are to have in every frame, k1 first: the mean of those they have, made smooth, and of the dancer's.
+/// The lengths that bones are to have in every frame, k1 first: the mean of those they have, made
+/// smooth, and of the dancer's.
 pub fn lengths_wanted(predicted: &[Body]) -> Vec<Lengths> {
     let has = |body: &Body| -> Lengths { std::array::from_fn(|joint| length(bone(body, joint))) };
     let mut lengths: Vec<Lengths> = predicted.iter().map(has).collect();
@@ -42,7 +43,8 @@ pub fn lengths_wanted(predicted: &[Body]) -> Vec<Lengths> {
     lengths
 }
 
-/// Replaces the lengths l of the frames between the keyframes by the x of least `sum_t |x_t - l_t|^2 + 100 |x_(t+1) - 2 x_t + x_(t-1)|^2`.
+/// Replaces the lengths l of the frames between the keyframes by the x of least `sum_t |x_t -
+/// l_t|^2 + 100 |x_(t+1) - 2 x_t + x_(t-1)|^2`.
 fn smooth(lengths: &mut [Lengths]) {
     let steps = lengths.len() - 1;
     let rough = rough(lengths);

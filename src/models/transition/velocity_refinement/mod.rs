@@ -1,21 +1,26 @@
-//! Predicted bodies brought to the velocity factors that were asked for, after the last frame is predicted; not in the paper.
+//! Predicted bodies brought to the velocity factors that were asked for, after the last frame is
+//! predicted; not in the paper.
 //!
-//! A network that is trained on distances gives about the mean of the motions that fit, which is slower than each of them, and trembles where
-//! frames are corrected one by one. What is wanted is near it, smooth, and as fast as asked for: with p_t the predicted p^b, x_t
-//! the refined one, x_0 keyframe k1 and x_N = p_N,
+//! A network that is trained on distances gives about the mean of the motions that fit, which is
+//! slower than each of them, and trembles where frames are corrected one by one. What is wanted is
+//! near it, smooth, and as fast as asked for: with p_t the predicted p^b, x_t the refined one, x_0
+//! keyframe k1 and x_N = p_N,
 //!
 //! ```text
 //! sum_t ||x_t - p_t||^2 + 100 ||x_(t+1) - 2 x_t + x_(t-1)||^2 + 300 ||x_t - x_(t-1) - w_t||^2
 //! ```
 //!
-//! where w_t are the velocities that a motion has, each joint's times the ratio of the velocity factor (eq. 1) asked for to the one its part of
-//! the body has in that frame. Ten times, beginning with p itself, w is taken from the last x, x is the minimum (a linear system with two
-//! diagonals beside the main one, the same for all 69 numbers), and then each bone, from the root outwards, keeps its direction and gets the mean
-//! of two lengths: that in p_t and the dancer's, which goes evenly from k1's to p_N's. The lengths in p are smoothed
-//! over time beforehand, by the first two terms. (Constraints met by turns: projective dynamics, Bouaziz et al., ACM TOG 33(4), 2014.)
+//! where w_t are the velocities that a motion has, each joint's times the ratio of the velocity
+//! factor (eq. 1) asked for to the one its part of the body has in that frame. Ten times, beginning
+//! with p itself, w is taken from the last x, x is the minimum (a linear system with two diagonals
+//! beside the main one, the same for all 69 numbers), and then each bone, from the root outwards,
+//! keeps its direction and gets the mean of two lengths: that in p_t and the dancer's, which goes
+//! evenly from k1's to p_N's. The lengths in p are smoothed over time beforehand, by the first two
+//! terms. (Constraints met by turns: projective dynamics, Bouaziz et al., ACM TOG 33(4), 2014.)
 //!
-//! A mean of motions has short bones where these differ, and so is nearer to each of them than a body with the dancer's own; but joints that
-//! are as fast as asked on short bones are too fast once rotations put them on the skeleton's. Halfway had the best LRP on validation clips.
+//! A mean of motions has short bones where these differ, and so is nearer to each of them than a
+//! body with the dancer's own; but joints that are as fast as asked on short bones are too fast
+//! once rotations put them on the skeleton's. Halfway had the best LRP on validation clips.
 
 mod bones;
 mod system;
@@ -31,7 +36,8 @@ use system::System;
 const ACCELERATION_WEIGHT: f64 = 100.0;
 const VELOCITY_WEIGHT: f64 = 300.0;
 const ROUNDS: usize = 10;
-/// What a velocity is multiplied with at most in one round: a part that hardly moves has no direction to go on in.
+/// What a velocity is multiplied with at most in one round: a part that hardly moves has no
+/// direction to go on in.
 const MOST: f64 = 3.0;
 
 /// Numbers of p^b.
@@ -40,9 +46,11 @@ const NUMBERS: usize = BODY_POSITIONS.end;
 /// p^b of a frame, cm.
 type Body = [f64; NUMBERS];
 
-/// Changes p^b in frames k1 + 1 .. k2 - 1 as the module says, and sets v^b of all frames to the steps of p^b.
+/// Changes p^b in frames k1 + 1 .. k2 - 1 as the module says, and sets v^b of all frames to the
+/// steps of p^b.
 ///
-/// `frames`: k1 + 1 .. k2, `[N, 149]`, not standardised (cm, cm/frame), N that of the request, which has passed its check.
+/// `frames`: k1 + 1 .. k2, `[N, 149]`, not standardised (cm, cm/frame), N that of the request,
+/// which has passed its check.
 pub fn refine(request: &TransitionRequest, mut frames: ArrayViewMut2<f64>) {
     let body = |row: ArrayView1<f64>| -> Body { std::array::from_fn(|i| row[i]) };
     let mut predicted = vec![body(request.start.features.view())];

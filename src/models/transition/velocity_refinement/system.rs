@@ -1,6 +1,8 @@
-//! The linear system whose solution is nearest to what is asked, smooth and of the speed that is asked for.
+//! The linear system whose solution is nearest to what is asked, smooth and of the speed that is
+//! asked for.
 
-/// The matrix of the linear system in frames k1 + 1 .. k2 - 1 as L D L^T, L with ones in its main diagonal and two diagonals below.
+/// The matrix of the linear system in frames k1 + 1 .. k2 - 1 as L D L^T, L with ones in its main
+/// diagonal and two diagonals below.
 pub struct System {
     diagonal: Vec<f64>,
     /// L in row t + 1 and t + 2 of column t.
@@ -8,7 +10,8 @@ pub struct System {
 }
 
 impl System {
-    /// For transitions of `length` frames, with these weights of steps and of second differences; values themselves have weight 1.
+    /// For transitions of `length` frames, with these weights of steps and of second differences;
+    /// values themselves have weight 1.
     pub fn new(length: usize, step_weight: f64, acceleration_weight: f64) -> Self {
         let mut matrix = vec![[0.0; 3]; length + 1]; // columns t, t + 1, t + 2 of row t
         for row in &mut matrix {
