@@ -52,8 +52,6 @@ pub struct Evaluation {
 /// Why there are no scores.
 #[derive(Debug, Error)]
 pub enum EvaluationError {
-    #[error("a length of 0 frames has nothing to predict; give lengths of 1 or more")]
-    ZeroLength,
     #[error(
         "none of the {clips} clips has the {needed} frames of a window at N = {length} (the longest has {longest}); \
          give longer clips or leave this length out"
@@ -66,29 +64,14 @@ pub enum EvaluationError {
     },
     #[error(transparent)]
     Part(#[from] EmptyPart),
-    /// A recording that the protocol cannot measure.
+    /// What the protocol cannot measure, and why.
     #[error("{reason}")]
     Data { reason: String },
-    #[error("{model} gave {found} answers to {expected} requests")]
-    Count {
-        model: String,
-        expected: usize,
-        found: usize,
-    },
-    #[error("{model}, {clip}, frames {start} to {end}")]
-    Prediction {
-        model: String,
-        clip: String,
-        start: usize,
-        end: usize,
-        source: Box<ModelError>,
-    },
-    #[error("{model}, a chunk of windows at N = {length} that starts with {clip}, frame {start}")]
-    Chunk {
-        model: String,
-        length: usize,
-        clip: String,
-        start: usize,
+    /// A model that fails, or gives something that does not fit.
+    #[error("{what}")]
+    Model {
+        /// Its name, and what it was asked for.
+        what: String,
         source: Box<ModelError>,
     },
 }

@@ -2,7 +2,7 @@
 //! they were measured. Scores on other clips than the test clips have files of their own, such as
 //! `evaluation_validation.json`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -12,31 +12,12 @@ use crate::data::{DataPart, Dataset, EmptyPart, Recording};
 use crate::report::thousands;
 use crate::run::{FileError, write_json};
 
-/// Why a folder's scores cannot be read; each says how to get some.
+/// Why a folder's scores cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    #[error("{} has no {name}; to get one, {}", folder.display(), remedy(folder))]
-    Missing { folder: PathBuf, name: &'static str },
-    #[error(
-        "{} holds no scores on test clips; to get some, {}: {cause}",
-        folder.join(name).display(),
-        remedy(folder)
-    )]
-    Damaged {
-        folder: PathBuf,
-        name: &'static str,
-        cause: serde_json::Error,
-    },
-    #[error(
-        "{} are scores on {part} clips, not on the test clips; to get those, {}",
-        folder.join(name).display(),
-        remedy(folder)
-    )]
-    OtherPart {
-        folder: PathBuf,
-        name: &'static str,
-        part: DataPart,
-    },
+    /// There are none, or others: how to get some.
+    #[error("{0}")]
+    Refused(String),
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -153,37 +134,41 @@ impl EvaluationRecord {
             data: read_json(folder, data)?,
         };
         if !record.data.part.is_test() {
-            return Err(RecordError::OtherPart {
-                folder: folder.into(),
-                name: scores,
-                part: record.data.part,
-            });
+            return Err(RecordError::Refused(format!(
+                "{} are scores on {} clips, not on the test clips; to get those, {}",
+                folder.join(scores).display(),
+                record.data.part,
+                remedy(folder)
+            )));
         }
         Ok(record)
     }
 }
 
-fn read_json<T: DeserializeOwned>(folder: &Path, name: &'static str) -> Result<T, RecordError> {
+fn read_json<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, RecordError> {
     let path = folder.join(name);
     if !path.exists() {
-        return Err(RecordError::Missing {
-            folder: folder.into(),
-            name,
-        });
+        return Err(RecordError::Refused(format!(
+            "{} has no {name}; to get one, {}",
+            folder.display(),
+            remedy(folder)
+        )));
     }
     let text = std::fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
-    serde_json::from_str(&text).map_err(|cause| RecordError::Damaged {
-        folder: folder.into(),
-        name,
-        cause,
+    serde_json::from_str(&text).map_err(|cause| {
+        RecordError::Refused(format!(
+            "{} holds no scores on test clips; to get some, {}: {cause}",
+            path.display(),
+            remedy(folder)
+        ))
     })
 }
 
 /// How a folder gets scores on the test clips.
 fn remedy(folder: &Path) -> String {
+    let folder = folder.display();
     format!(
-        "run `keydance evaluate {} --data DIR` (a config: `keydance evaluate CONFIG --data DIR --out {}`)",
-        folder.display(),
-        folder.display()
+        "run `keydance evaluate {folder} --data DIR` (a config: `keydance evaluate CONFIG --data DIR \
+         --out {folder}`)"
     )
 }

@@ -14,7 +14,7 @@ const LONGEST: usize = 10_000;
 const MOST_WINDOWS: usize = 65_536;
 
 /// A whole experiment. Every key may be left out.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct ExperimentConfig {
     /// Name of the experiment in tables and manifests.
     pub name: String,
@@ -22,11 +22,13 @@ pub struct ExperimentConfig {
     pub seed: u64,
     pub data: DataConfig,
     /// `[model]`, and the other tables that are the model's own.
+    #[serde(skip)]
     pub model: Box<dyn ModelSettings>,
     pub optimiser: AdamConfig,
     pub checkpoint: CheckpointConfig,
     pub log: LogConfig,
     /// Left out: a training does not score itself on validation clips.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<ValidationConfig>,
 }
 

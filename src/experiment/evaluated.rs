@@ -3,22 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::ExperimentConfig;
-use crate::evaluation::{EvaluationRecord, RecordError, TableRow};
+use super::{ExperimentConfig, ReproduceError};
+use crate::evaluation::{EvaluationRecord, TableRow};
 use crate::report::{NO_TRAINING, schedule_note};
-use crate::run::{Manifest, RunError, RunFolder};
-
-/// Why runs' scores do not stand in one table.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluatedError {
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// Both as what was measured on what.
-    #[error("scores of different data do not stand in one table: {0}, but {1}")]
-    OtherData(String, String),
-}
+use crate::run::{Manifest, RunFolder};
 
 /// A run with its scores.
 pub struct EvaluatedRun {
@@ -34,23 +22,24 @@ impl EvaluatedRun {
     ///
     /// # Errors
     /// A folder has no scores, a file of it is damaged, or the scores are of different data.
-    pub fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, EvaluatedError> {
+    pub fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, ReproduceError> {
         let runs: Vec<Self> = folders
             .iter()
             .map(|folder| Self::read(folder))
             .collect::<Result<_, _>>()?;
         for pair in runs.windows(2) {
             if !pair[0].on_the_data_of(&pair[1]) {
-                return Err(EvaluatedError::OtherData(
+                return Err(ReproduceError::Refused(format!(
+                    "scores of different data do not stand in one table: {}, but {}",
                     pair[0].measured(),
-                    pair[1].measured(),
-                ));
+                    pair[1].measured()
+                )));
             }
         }
         Ok(runs)
     }
 
-    fn read(folder: &Path) -> Result<Self, EvaluatedError> {
+    fn read(folder: &Path) -> Result<Self, ReproduceError> {
         let run = RunFolder::open(folder);
         let record = EvaluationRecord::read(folder)?;
         Ok(Self {
@@ -67,10 +56,10 @@ impl EvaluatedRun {
             name: self.config.name.clone(),
             seed: self.manifest.as_ref().map(|manifest| manifest.seed),
             scores: Some(self.record.scores.clone()),
-            schedule_note: self.manifest.as_ref().map_or_else(
-                || NO_TRAINING.into(),
-                |manifest| schedule_note(&self.config, manifest),
-            ),
+            schedule_note: match &self.manifest {
+                Some(manifest) => schedule_note(&self.config, manifest),
+                None => NO_TRAINING.into(),
+            },
         }
     }
 

@@ -1,5 +1,7 @@
 //! Configs from files: small overrides on a base, overrides of the command line on top, unknown keys refused.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,7 +10,7 @@ use toml::{Table, Value};
 
 use super::config::{ExperimentConfig, Shared};
 use crate::models::registry;
-use crate::models::settings::{ModelKind, ValueError};
+use crate::models::settings::ModelKind;
 
 /// The key that names the file that a config overrides.
 const BASE: &str = "base";
@@ -22,38 +24,11 @@ const CHOICES: [&str; 1] = ["data.split"];
 /// Why there is no config.
 #[derive(Debug, Error)]
 pub enum ConfigError {
-    #[error("the config {path} cannot be read: {cause}")]
-    File {
-        path: PathBuf,
-        cause: std::io::Error,
-    },
-    #[error("the config {path} has more than {LARGEST_FILE} bytes")]
-    TooLarge { path: PathBuf },
-    #[error("the config {path} is not TOML: {cause}")]
-    Syntax {
-        path: PathBuf,
-        cause: Box<toml::de::Error>,
-    },
-    #[error("{origin}: unknown key {key}: remove it")]
-    UnknownKey { origin: String, key: String },
-    #[error("{origin}: {message}")]
-    Layer { origin: String, message: String },
-    #[error("{path} is its own base: {}", list(chain))]
-    Cycle { path: PathBuf, chain: Vec<PathBuf> },
-    #[error("--set {set}: {problem}; expected KEY=VALUE such as schedule.fraction=0.005")]
-    Set { set: String, problem: &'static str },
-    #[error("{origin}: {cause}")]
-    Value { origin: String, cause: ValueError },
+    /// Which file or override is to blame, what is wrong with it, and what would do.
+    #[error("{0}")]
+    Refused(String),
     #[error("the config cannot be written as TOML")]
     Serialise(#[from] toml::ser::Error),
-}
-
-fn list(chain: &[PathBuf]) -> String {
-    let names: Vec<String> = chain
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    names.join(" -> ")
 }
 
 /// One cause of overrides, and what to call it in an error.
@@ -97,11 +72,8 @@ impl ExperimentConfig {
     /// # Errors
     /// As [`ExperimentConfig::load`].
     pub fn with_sets(sets: &[String]) -> Result<Self, ConfigError> {
-        let layers: Vec<Layer> = sets
-            .iter()
-            .map(|set| set_layer(set))
-            .collect::<Result<_, _>>()?;
-        resolve(&layers)
+        let layers = sets.iter().map(|set| set_layer(set));
+        resolve(&layers.collect::<Result<Vec<_>, _>>()?)
     }
 
     /// Reads a config from TOML text, without a base.
@@ -109,10 +81,9 @@ impl ExperimentConfig {
     /// # Errors
     /// As [`ExperimentConfig::load`]; `origin` names the text in them.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        let table = parse_table(text, Path::new(origin))?;
         resolve(&[Layer {
+            table: parse_table(text, origin)?,
             origin: origin.into(),
-            table,
         }])
     }
 
@@ -125,22 +96,12 @@ impl ExperimentConfig {
     }
 
     fn to_table(&self) -> Result<Table, ConfigError> {
-        let shared = Table::try_from(Shared {
-            name: self.name.clone(),
-            seed: self.seed,
-            data: self.data.clone(),
-            optimiser: self.optimiser.clone(),
-            checkpoint: self.checkpoint.clone(),
-            log: self.log.clone(),
-            validation: self.validation.clone(),
-        })?;
         let mut table = Table::new();
-        let own = self.model.tables()?;
-        for (key, value) in shared {
+        for (key, value) in Table::try_from(self)? {
             let is_data = key == "data";
             table.insert(key, value);
             if is_data {
-                table.extend(own.clone());
+                table.extend(self.model.tables()?);
             }
         }
         Ok(table)
@@ -151,21 +112,19 @@ impl ExperimentConfig {
     /// # Errors
     /// A number that TOML does not have.
     pub fn differences(&self, other: &Self) -> Result<Vec<String>, ConfigError> {
-        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        let (mut ours, mut theirs) = (BTreeMap::new(), BTreeMap::new());
         flatten("", &Value::Table(self.to_table()?), &mut ours);
         flatten("", &Value::Table(other.to_table()?), &mut theirs);
-        let mut keys: Vec<&String> = ours.iter().chain(&theirs).map(|(key, _)| key).collect();
-        keys.sort_unstable();
-        keys.dedup();
-        let value = |side: &[(String, String)], key: &String| {
-            let found = side.iter().find(|(k, _)| k == key);
-            found.map_or("none".to_string(), |(_, value)| value.clone())
-        };
-        Ok(keys
+        let keys: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
+        let differing = keys
             .into_iter()
-            .map(|key| (key, value(&ours, key), value(&theirs, key)))
-            .filter(|(_, ours, theirs)| ours != theirs)
-            .map(|(key, ours, theirs)| format!("{key}: {ours}, {theirs}"))
+            .map(|key| (key, [&ours, &theirs].map(|side| side.get(key))))
+            .filter(|(_, [ours, theirs])| ours != theirs);
+        Ok(differing
+            .map(|(key, sides)| {
+                let [ours, theirs] = sides.map(|side| side.map_or("none", String::as_str));
+                format!("{key}: {ours}, {theirs}")
+            })
             .collect())
     }
 
@@ -177,36 +136,34 @@ impl ExperimentConfig {
         let mut differences = self.differences(other)?;
         let after = other.model.keys_after_the_network();
         differences.retain(|difference| {
-            let (key, _) = difference.split_once(':').unwrap_or((difference, ""));
-            !after.contains(&key)
+            let key = difference.split(':').next();
+            key.is_none_or(|key| !after.contains(&key))
         });
         Ok(differences)
     }
 }
 
-fn flatten(key: &str, value: &Value, found: &mut Vec<(String, String)>) {
-    match value {
-        Value::Table(table) => {
-            for (name, value) in table {
-                flatten(&join(key, name), value, found);
-            }
-        }
-        _ => found.push((key.into(), value.to_string())),
+/// The values of all dotted keys, as TOML.
+fn flatten(key: &str, value: &Value, found: &mut BTreeMap<String, String>) {
+    let Value::Table(table) = value else {
+        found.insert(key.into(), value.to_string());
+        return;
+    };
+    for (name, value) in table {
+        flatten(&join(key, name), value, found);
     }
 }
 
 fn join(key: &str, name: &str) -> String {
-    if key.is_empty() {
-        name.into()
-    } else {
-        format!("{key}.{name}")
+    match key {
+        "" => name.into(),
+        _ => format!("{key}.{name}"),
     }
 }
 
-fn parse_table(text: &str, path: &Path) -> Result<Table, ConfigError> {
-    text.parse().map_err(|cause| ConfigError::Syntax {
-        path: path.into(),
-        cause: Box::new(cause),
+fn parse_table(text: &str, origin: &str) -> Result<Table, ConfigError> {
+    text.parse().map_err(|cause: toml::de::Error| {
+        ConfigError::Refused(format!("the config {origin} is not TOML: {cause}"))
     })
 }
 
@@ -216,24 +173,23 @@ fn read_layers(
     above: &mut Vec<PathBuf>,
     layers: &mut Vec<Layer>,
 ) -> Result<(), ConfigError> {
-    let unreadable = |cause| ConfigError::File {
-        path: path.into(),
-        cause,
-    };
+    let origin = path.display().to_string();
+    let bad = |problem: &str| ConfigError::Refused(format!("the config {origin} {problem}"));
+    let unreadable = |cause: io::Error| bad(&format!("cannot be read: {cause}"));
     let canonical = path.canonicalize().map_err(unreadable)?;
-    if above.contains(&canonical) {
-        return Err(ConfigError::Cycle {
-            path: path.into(),
-            chain: above.iter().chain([&canonical]).cloned().collect(),
-        });
-    }
+    let cycle = above.contains(&canonical);
     above.push(canonical);
+    if cycle {
+        let chain = above.iter().map(|path| path.display().to_string());
+        let chain = chain.collect::<Vec<_>>().join(" -> ");
+        let message = format!("{origin} is its own base: {chain}");
+        return Err(ConfigError::Refused(message));
+    }
     if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_FILE {
-        return Err(ConfigError::TooLarge { path: path.into() });
+        return Err(bad(&format!("has more than {LARGEST_FILE} bytes")));
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
-    let origin = path.display().to_string();
-    let mut table = parse_table(&text, path)?;
+    let mut table = parse_table(&text, &origin)?;
     match table.remove(BASE) {
         None => {}
         Some(Value::String(base)) => {
@@ -241,10 +197,9 @@ fn read_layers(
             read_layers(&folder.join(base), above, layers)?;
         }
         Some(other) => {
-            return Err(ConfigError::Layer {
-                origin,
-                message: format!("base = {other}: expected the name of a file in quotes"),
-            });
+            return Err(ConfigError::Refused(format!(
+                "{origin}: base = {other}: expected the name of a file in quotes"
+            )));
         }
     }
     layers.push(Layer { origin, table });
@@ -252,9 +207,10 @@ fn read_layers(
 }
 
 fn set_layer(set: &str) -> Result<Layer, ConfigError> {
-    let bad = |problem| ConfigError::Set {
-        set: set.into(),
-        problem,
+    let bad = |problem| {
+        ConfigError::Refused(format!(
+            "--set {set}: {problem}; expected KEY=VALUE such as schedule.fraction=0.005"
+        ))
     };
     let (key, text) = set.split_once('=').ok_or_else(|| bad("has no '='"))?;
     let parts: Vec<&str> = key.trim().split('.').collect();
@@ -263,25 +219,23 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
     }
     let text = text.trim();
     let parsed = format!("value = {text}").parse::<Table>().ok();
-    let value = match parsed
-        .filter(|table| table.len() == 1)
-        .and_then(|mut t| t.remove("value"))
-    {
+    let parsed = parsed.filter(|table| table.len() == 1);
+    let value = match parsed.and_then(|mut table| table.remove("value")) {
         Some(value) => value,
         None if text.starts_with(['[', '{', '"', '\'']) || text.contains(['\n', '\r']) => {
             return Err(bad("has a value that is not TOML"));
         }
         None => Value::String(text.into()),
     };
-    let value = parts.iter().rev().fold(value, |value, part| {
-        Value::Table(Table::from_iter([(part.trim().to_string(), value)]))
-    });
+    let (outermost, inner) = (parts[0], &parts[1..]);
+    let within = |value, part: &&str| Table::from_iter([(part.trim().to_string(), value)]);
+    let value = inner
+        .iter()
+        .rev()
+        .fold(value, |value, part| Value::Table(within(value, part)));
     Ok(Layer {
         origin: format!("--set {set}"),
-        table: match value {
-            Value::Table(table) => table,
-            _ => Table::new(),
-        },
+        table: within(value, &outermost),
     })
 }
 
@@ -310,19 +264,17 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
         kind.rename_former_keys(&mut above);
         merge(&mut table, &above, "");
         read = Some(parse_layer(&table, &*kind, origin)?);
-        own.push((origin, above));
+        own.push((origin.as_str(), above));
     }
     let mut config = match read {
         Some(config) => config,
         None => parse_layer(&table, &*kind, "the defaults")?,
     };
     config.validate().map_err(|cause| {
-        let brings = |(_, table): &&(&String, Table)| has(table, &cause.key);
+        let brings = |(_, table): &&(&str, Table)| has(table, &cause.key);
         let layer = own.iter().rev().find(brings).or(own.last());
-        ConfigError::Value {
-            origin: layer.map_or("the defaults".into(), |(origin, _)| (*origin).clone()),
-            cause,
-        }
+        let origin = layer.map_or("the defaults", |(origin, _)| origin);
+        ConfigError::Refused(format!("{origin}: {cause}"))
     })?;
     // A budget is over any model; what it says of a part that this one lacks makes no other experiment of it.
     let groups = config.model.rate_groups();
@@ -341,10 +293,7 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
 }
 
 fn no_kinds() -> ConfigError {
-    ConfigError::Layer {
-        origin: "the registry".into(),
-        message: "knows no kind of model".into(),
-    }
+    ConfigError::Refused("the registry: knows no kind of model".into())
 }
 
 fn find_kind(named: &Value, origin: &str) -> Result<Arc<dyn ModelKind>, ConfigError> {
@@ -352,13 +301,10 @@ fn find_kind(named: &Value, origin: &str) -> Result<Arc<dyn ModelKind>, ConfigEr
     found.ok_or_else(|| {
         let kinds = registry::kinds();
         let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
-        ConfigError::Layer {
-            origin: origin.into(),
-            message: format!(
-                "model.kind = {named}: there is no such kind of model; known are {}",
-                names.join(", ")
-            ),
-        }
+        ConfigError::Refused(format!(
+            "{origin}: model.kind = {named}: there is no such kind of model; known are {}",
+            names.join(", ")
+        ))
     })
 }
 
@@ -368,9 +314,9 @@ fn parse_layer(
     kind: &dyn ModelKind,
     origin: &str,
 ) -> Result<ExperimentConfig, ConfigError> {
-    let unread = |error: toml::de::Error| ConfigError::Layer {
-        origin: origin.into(),
-        message: error.to_string().trim_end().replace('\n', " "),
+    let unread = |error: toml::de::Error| {
+        let message = error.to_string().trim_end().replace('\n', " ");
+        ConfigError::Refused(format!("{origin}: {message}"))
     };
     let own = kind.defaults();
     let (own, mut shared): (Table, Table) = table
@@ -402,10 +348,9 @@ fn parse_layer(
     };
     // A model without fields takes any key without a word: what does not come back out was not understood.
     match missing(table, &config.to_table()?, "") {
-        Some(key) => Err(ConfigError::UnknownKey {
-            origin: origin.into(),
-            key,
-        }),
+        Some(key) => Err(ConfigError::Refused(format!(
+            "{origin}: unknown key {key}: remove it"
+        ))),
         None => Ok(config),
     }
 }

@@ -11,7 +11,7 @@ pub mod rows;
 
 pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
 pub use error::ReproduceError;
-pub use evaluated::{EvaluatedError, EvaluatedRun};
+pub use evaluated::EvaluatedRun;
 pub use layers::ConfigError;
 pub use reproduce::{Ending, Observer, Reproduction, StepObserver};
 pub use rows::{Row, Seeds};

@@ -6,23 +6,24 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::ReproduceError;
-use super::results::{RowResults, table_row};
+use super::results::RowResults;
 use super::rows::Row;
+use super::{ReproduceError, Reproduction};
 use crate::data::hexadecimal;
-use crate::evaluation::{EvaluationRecord, PrintedTables, TableRow, Tables};
-use crate::report::score_figure;
-use crate::run::{FileError, RunFolder, replace_file, write_json};
+use crate::evaluation::{EvaluationRecord, TableRow, Tables};
+use crate::report::{NO_TRAINING, schedule_note, score_figure};
+use crate::run::{FileError, Manifest as RunManifest, RunState, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const MANIFEST: &str = "manifest.json";
 
 /// A row with what there is of it.
-pub struct Reported<'r> {
-    pub row: &'r Row,
-    pub record: Option<EvaluationRecord>,
-    pub results: RowResults,
-    pub run: RunFolder,
+struct Reported<'r> {
+    row: &'r Row,
+    record: Option<EvaluationRecord>,
+    results: RowResults,
+    /// Of the training whose scores there are; without scores, of the training as far as it is.
+    manifest: Option<RunManifest>,
 }
 
 /// `manifest.json` of all results.
@@ -45,89 +46,110 @@ struct ManifestRow<'r> {
     seed: u64,
     /// Trained, where there is anything to train, and evaluated.
     done: bool,
-    note: String,
+    note: &'r str,
     /// Of the training, as in the row's own manifest.
     seconds: Option<f64>,
-    weights_digest: Option<String>,
-    commit: Option<String>,
+    weights_digest: Option<&'r str>,
+    commit: Option<&'r str>,
 }
 
-/// Writes everything anew from what the rows have.
-///
-/// # Errors
-/// A file cannot be read or written.
-pub fn write(
-    out: &Path,
-    rows: &[Reported<'_>],
-    printed: &PrintedTables,
-    data_digest: &str,
-) -> Result<(), ReproduceError> {
-    let table_rows: Vec<TableRow> = rows
-        .iter()
-        .map(|reported| {
-            let Reported {
-                row,
-                record,
-                results,
-                run,
-            } = reported;
-            table_row(row, record.as_ref(), results, run)
-        })
-        .collect::<Result<_, ReproduceError>>()?;
-    let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {
-        return Ok(());
-    };
-    let protocol = rows[0].row.config.protocol();
-    let tables = Tables {
-        metrics: protocol.metrics(),
-        printed,
-    };
-    let text = tables.markdown(&table_rows, &record.data.caption());
-    let mut files: Vec<PathBuf> = vec![out.join(TABLES)];
-    replace_file(&files[0], text.as_bytes())?;
-    if let Some(metric) = protocol.metrics().first()
-        && let Some(drawn) = score_figure(metric, printed, &table_rows)?
-    {
-        let figure = out.join(metric.key).with_extension("svg");
-        replace_file(&figure, drawn.as_bytes())?;
-        files.push(figure);
+impl Reproduction<'_> {
+    /// Writes tables, figures and manifest anew from what the rows have.
+    ///
+    /// # Errors
+    /// A file cannot be read or written.
+    pub(super) fn report(&self) -> Result<(), ReproduceError> {
+        let reported = self.rows.iter().map(|row| self.reported(row));
+        let rows: Vec<Reported<'_>> = reported.collect::<Result<_, _>>()?;
+        let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {
+            return Ok(());
+        };
+        let table_rows: Vec<TableRow> = rows.iter().map(Reported::table_row).collect();
+        let (out, printed) = (self.out, self.printed);
+        let protocol = rows[0].row.config.protocol();
+        let metrics = protocol.metrics();
+        let text = Tables { metrics, printed }.markdown(&table_rows, &record.data.caption());
+        let mut files: Vec<PathBuf> = vec![out.join(TABLES)];
+        replace_file(&files[0], text)?;
+        if let Some(metric) = metrics.first()
+            && let Some(drawn) = score_figure(metric, printed, &table_rows)?
+        {
+            let figure = out.join(metric.key).with_extension("svg");
+            replace_file(&figure, drawn)?;
+            files.push(figure);
+        }
+        files.extend(rows.iter().flat_map(|reported| reported.results.files()));
+        let manifest_rows = rows.iter().zip(&table_rows);
+        let manifest = Manifest {
+            data_digest: &self.dataset.digest,
+            version: env!("CARGO_PKG_VERSION"),
+            commit: option_env!("KEYDANCE_COMMIT"),
+            rows: manifest_rows
+                .map(|(reported, table_row)| reported.manifest_row(table_row))
+                .collect(),
+            files: digests(out, &files)?,
+        };
+        Ok(write_json(&out.join(MANIFEST), &manifest)?)
     }
-    files.extend(rows.iter().flat_map(|reported| reported.results.files()));
-    let manifest = Manifest {
-        data_digest,
-        version: env!("CARGO_PKG_VERSION"),
-        commit: option_env!("KEYDANCE_COMMIT"),
-        rows: rows
-            .iter()
-            .zip(&table_rows)
-            .map(|(reported, table_row)| manifest_row(reported, table_row))
-            .collect::<Result<_, ReproduceError>>()?,
-        files: digests(out, &files)?,
-    };
-    Ok(write_json(&out.join(MANIFEST), &manifest)?)
+
+    fn reported<'r>(&self, row: &'r Row) -> Result<Reported<'r>, ReproduceError> {
+        let results = RowResults::of(row, self.out);
+        let record = results.read(row, self.dataset)?;
+        let manifest = match record {
+            Some(_) => results.folder.manifest()?,
+            None => self.run_of(row).manifest()?,
+        };
+        Ok(Reported {
+            row,
+            record,
+            results,
+            manifest,
+        })
+    }
 }
 
-fn manifest_row<'r>(
-    reported: &Reported<'r>,
-    table_row: &TableRow,
-) -> Result<ManifestRow<'r>, ReproduceError> {
-    let training = match reported.record {
-        Some(_) => reported.results.manifest()?,
-        None => None,
-    };
-    let config = &reported.row.config;
-    Ok(ManifestRow {
-        name: &config.name,
-        folder: &reported.row.folder,
-        seed: config.seed,
-        done: reported.record.is_some(),
-        note: table_row.schedule_note.clone(),
-        seconds: training.as_ref().map(|training| training.seconds),
-        weights_digest: training
-            .as_ref()
-            .and_then(|training| training.weights_digest.clone()),
-        commit: training.and_then(|training| training.commit),
-    })
+impl Reported<'_> {
+    /// The row in the tables: with its scores, or with why it has none.
+    fn table_row(&self) -> TableRow {
+        let config = &self.row.config;
+        let note = match (&self.manifest, &self.record) {
+            _ if !self.row.is_trained() => NO_TRAINING.into(),
+            (None, _) => "not trained yet".into(),
+            (Some(manifest), Some(_)) => schedule_note(config, manifest),
+            (Some(manifest), None) => {
+                let (done, steps) = (manifest.steps_done, manifest.steps);
+                match manifest.state {
+                    RunState::Diverged => format!(
+                        "diverged: a loss or gradient was not finite after step {done} of {steps}"
+                    ),
+                    RunState::Finished => "trained, but not evaluated yet".into(),
+                    _ => format!("not trained yet: {done} of {steps} steps at the last checkpoint"),
+                }
+            }
+        };
+        TableRow {
+            name: config.name.clone(),
+            seed: self.row.is_trained().then_some(config.seed),
+            scores: self.record.as_ref().map(|record| record.scores.clone()),
+            schedule_note: note,
+        }
+    }
+
+    fn manifest_row<'r>(&'r self, table_row: &'r TableRow) -> ManifestRow<'r> {
+        let done = self.record.is_some();
+        let training = self.manifest.as_ref().filter(|_| done);
+        let config = &self.row.config;
+        ManifestRow {
+            name: &config.name,
+            folder: &self.row.folder,
+            seed: config.seed,
+            done,
+            note: &table_row.schedule_note,
+            seconds: training.map(|training| training.seconds),
+            weights_digest: training.and_then(|training| training.weights_digest.as_deref()),
+            commit: training.and_then(|training| training.commit.as_deref()),
+        }
+    }
 }
 
 fn digests(out: &Path, files: &[PathBuf]) -> Result<BTreeMap<String, String>, FileError> {

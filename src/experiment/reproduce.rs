@@ -1,5 +1,4 @@
-//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them
-//! all.
+//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them all.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -10,13 +9,12 @@ use std::sync::{Mutex, PoisonError};
 use rayon::ThreadPoolBuilder;
 
 use super::ReproduceError;
-use super::report::{self, Reported};
 use super::results::RowResults;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, Scores};
 use crate::models::Generator;
-use crate::run::{RunError, RunFolder, RunState};
+use crate::run::{Manifest, RunFolder, RunState};
 use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
 
 /// Is told how a reproduction goes, by several threads where several rows are trained at the same
@@ -97,14 +95,6 @@ pub enum Ending {
     Diverged(TrainingError),
 }
 
-/// How a row ended.
-enum RowOutcome {
-    Done,
-    /// Asked to stop, or not to train.
-    Left,
-    Diverged(TrainingError),
-}
-
 impl Reproduction<'_> {
     /// Trains and evaluates what is left of the chosen rows, and writes the tables again after
     /// each.
@@ -117,13 +107,9 @@ impl Reproduction<'_> {
         for row in self.rows {
             self.check(row)?;
         }
-        let line = Line {
-            reproduction: self,
-            next: AtomicUsize::new(0),
-            diverged: Mutex::new(None),
-        };
+        let (next, diverged) = (AtomicUsize::new(0), Mutex::new(None));
         std::thread::scope(|scope| {
-            let jobs = (0..self.jobs).map(|_| scope.spawn(|| line.work()));
+            let jobs = (0..self.jobs).map(|_| scope.spawn(|| self.work(&next, &diverged)));
             // All begin before one is waited for.
             let jobs: Vec<_> = jobs.collect();
             jobs.into_iter().try_for_each(|job| match job.join() {
@@ -132,8 +118,7 @@ impl Reproduction<'_> {
             })
         })?;
         self.report()?;
-        let diverged = line
-            .diverged
+        let diverged = diverged
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         Ok(match diverged {
@@ -142,51 +127,40 @@ impl Reproduction<'_> {
             None => Ending::Finished,
         })
     }
-}
 
-/// Rows in a line, taken one after the other by the jobs.
-struct Line<'a> {
-    reproduction: &'a Reproduction<'a>,
-    /// The next of `chosen`; all are taken once a job has failed.
-    next: AtomicUsize,
-    /// The last training that diverged; held while the tables are written.
-    diverged: Mutex<Option<TrainingError>>,
-}
-
-impl Line<'_> {
-    /// Finishes row after row until none is left or the user asks to stop.
-    fn work(&self) -> Result<(), ReproduceError> {
-        let reproduction = self.reproduction;
-        let chosen = reproduction.chosen;
-        while !reproduction.observer.stop_asked() {
-            let index = self.next.fetch_add(1, Ordering::Relaxed);
-            let Some(row) = chosen.get(index) else {
+    /// Finishes row after row until none is left or the user asks to stop. `next` is the next of
+    /// `chosen`: all are taken once a job has failed. `diverged` is the last training that did so;
+    /// it is held while the tables are written.
+    fn work(
+        &self,
+        next: &AtomicUsize,
+        diverged: &Mutex<Option<TrainingError>>,
+    ) -> Result<(), ReproduceError> {
+        while !self.observer.stop_asked() {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(row) = self.chosen.get(index) else {
                 break;
             };
-            reproduction.observer.row(row, index + 1, chosen.len())?;
-            let outcome = reproduction.finish(row).and_then(|outcome| {
-                let mut diverged = self.diverged.lock().unwrap_or_else(PoisonError::into_inner);
-                match outcome {
-                    RowOutcome::Done => reproduction.report()?,
-                    RowOutcome::Diverged(error) => {
-                        reproduction.observer.diverged(row, &error);
-                        *diverged = Some(error);
-                    }
-                    RowOutcome::Left => {}
+            self.observer.row(row, index + 1, self.chosen.len())?;
+            let finished = self.finish(row);
+            let mut diverged = diverged.lock().unwrap_or_else(PoisonError::into_inner);
+            let outcome = match finished {
+                Err(ReproduceError::Training(error @ TrainingError::NonFinite { .. })) => {
+                    self.observer.diverged(row, &error);
+                    *diverged = Some(error);
+                    Ok(())
                 }
-                Ok(())
-            });
+                finished => finished.and_then(|()| self.report()),
+            };
             if outcome.is_err() {
-                self.next.store(chosen.len(), Ordering::Relaxed);
+                next.store(self.chosen.len(), Ordering::Relaxed);
                 return outcome;
             }
         }
         Ok(())
     }
-}
 
-impl Reproduction<'_> {
-    fn run_of(&self, row: &Row) -> RunFolder {
+    pub(super) fn run_of(&self, row: &Row) -> RunFolder {
         RunFolder::open(&self.runs.join(&row.folder))
     }
 
@@ -198,79 +172,50 @@ impl Reproduction<'_> {
             // The model, the schedule and the validation are refused here, not when hours of other
             // rows are over.
             if row.is_trained() && !self.no_training {
-                Trainer::new(row.config.clone(), self.dataset, 1).map_err(|error| {
-                    ReproduceError::Row {
-                        row: row.folder.clone(),
-                        source: error.into(),
-                    }
+                let trainer = Trainer::new(row.config.clone(), self.dataset, 1);
+                trainer.map_err(|error| ReproduceError::Row {
+                    row: row.folder.clone(),
+                    source: error.into(),
                 })?;
             }
             return Ok(());
         }
         let manifest = run.manifest()?;
         let config = run.config()?;
-        let differences = match &manifest {
+        run.check_config(&match is_finished(manifest.as_ref()) {
             // Nothing of it is trained any more.
-            Some(manifest) if manifest.state == RunState::Finished => {
-                config.training_differences(&row.config)?
-            }
-            _ => config.differences(&row.config)?,
-        };
-        if !differences.is_empty() {
-            return Err(RunError::OtherConfig {
-                path: run.config_path(),
-                differences,
-            }
-            .into());
+            true => config.training_differences(&row.config)?,
+            false => config.differences(&row.config)?,
+        })?;
+        if let Some(Manifest { data_digest, .. }) = manifest {
+            RunFolder::check_data(run.path(), &data_digest, &self.dataset.digest)?;
         }
-        match manifest {
-            Some(manifest) if manifest.data_digest != self.dataset.digest => {
-                Err(RunError::OtherData {
-                    path: run.path().into(),
-                    saved: manifest.data_digest,
-                    found: self.dataset.digest.clone(),
-                }
-                .into())
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     /// Trains and evaluates what is left of a row.
-    fn finish(&self, row: &Row) -> Result<RowOutcome, ReproduceError> {
+    fn finish(&self, row: &Row) -> Result<(), ReproduceError> {
         let results = RowResults::of(row, self.out);
         if results.read(row, self.dataset)?.is_some() {
             let folder = self.out.join(&row.folder);
-            self.observer
-                .note(&format!("done, see {}", folder.display()))?;
-            return Ok(RowOutcome::Done);
+            let note = format!("done, see {}", folder.display());
+            return Ok(self.observer.note(&note)?);
         }
         if let Some(model) = row.config.model.untrained(&row.config.data) {
             let scores = self.evaluate(row, &*model)?;
-            results.write(row, None, scores, self.dataset)?;
-            return Ok(RowOutcome::Done);
+            return results.write(row, None, scores, self.dataset);
         }
         let run = self.run_of(row);
-        let finished = run
-            .manifest()?
-            .is_some_and(|manifest| manifest.state == RunState::Finished);
-        if !finished {
+        if !is_finished(run.manifest()?.as_ref()) {
             if self.no_training {
-                self.observer.note("not trained yet")?;
-                return Ok(RowOutcome::Left);
+                return Ok(self.observer.note("not trained yet")?);
             }
-            match self.train(row) {
-                Ok(Outcome::Finished) => {}
-                Ok(Outcome::Stopped) => return Ok(RowOutcome::Left),
-                Err(ReproduceError::Training(error @ TrainingError::NonFinite { .. })) => {
-                    return Ok(RowOutcome::Diverged(error));
-                }
-                Err(error) => return Err(error),
+            if self.train(row)? == Outcome::Stopped {
+                return Ok(());
             }
         }
         let scores = self.evaluate(row, &*run.trained_model(&row.config)?)?;
-        results.write(row, Some(&run), scores, self.dataset)?;
-        Ok(RowOutcome::Done)
+        results.write(row, Some(&run), scores, self.dataset)
     }
 
     fn train(&self, row: &Row) -> Result<Outcome, ReproduceError> {
@@ -291,10 +236,10 @@ impl Reproduction<'_> {
 
     fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<Scores, ReproduceError> {
         let threads = self.threads;
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|cause| ReproduceError::Threads { threads, cause })?;
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|cause| {
+            ReproduceError::Refused(format!("no pool of {threads} threads: {cause}"))
+        })?;
         let protocol = row.config.protocol();
         let evaluation =
             pool.install(|| self.observer.evaluate(&*protocol, model, self.dataset))?;
@@ -303,22 +248,8 @@ impl Reproduction<'_> {
         }
         Ok(evaluation.scores)
     }
+}
 
-    /// Writes tables, figures and manifest from what there is.
-    fn report(&self) -> Result<(), ReproduceError> {
-        let reported: Vec<Reported<'_>> = self
-            .rows
-            .iter()
-            .map(|row| {
-                let results = RowResults::of(row, self.out);
-                Ok(Reported {
-                    row,
-                    record: results.read(row, self.dataset)?,
-                    results,
-                    run: self.run_of(row),
-                })
-            })
-            .collect::<Result<_, ReproduceError>>()?;
-        report::write(self.out, &reported, self.printed, &self.dataset.digest)
-    }
+fn is_finished(manifest: Option<&Manifest>) -> bool {
+    manifest.is_some_and(|manifest| manifest.state == RunState::Finished)
 }

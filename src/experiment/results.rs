@@ -7,19 +7,18 @@ use super::ReproduceError;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::scores::AVERAGE;
-use crate::evaluation::{EvaluatedData, EvaluationRecord, Scores, TableRow};
-use crate::report::{
-    LossSeries, NO_TRAINING, ValidationSeries, loss_curve, schedule_note, thousands,
-    validation_curve,
-};
-use crate::run::{FileError, LogLine, Manifest, RunFolder, RunState, replace_file};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, Scores};
+use crate::report::{LossSeries, ValidationSeries, loss_curve, thousands, validation_curve};
+use crate::run::{FileError, LogLine, RunFolder, replace_file};
 
 const LOSS_CURVE: &str = "loss_curve.svg";
+/// How results that are in the way are made again.
+const REMEDY: &str = "remove that folder to make it again, or give another --out";
 const VALIDATION_CURVE: &str = "validation_curve.svg";
 
 /// What became of a row: its folder in `--out`, which holds config, manifest, scores and figures.
 pub struct RowResults {
-    folder: RunFolder,
+    pub folder: RunFolder,
 }
 
 impl RowResults {
@@ -45,32 +44,25 @@ impl RowResults {
         }
         let differences = self.folder.config()?.differences(&row.config)?;
         if !differences.is_empty() {
-            return Err(ReproduceError::OtherConfig {
-                folder: path.into(),
-                differences,
-            });
+            return Err(ReproduceError::Refused(format!(
+                "{} holds results of another config ({}); values there, values now; {REMEDY}",
+                path.display(),
+                differences.join("; ")
+            )));
         }
-        let [scores, _] = EvaluationRecord::files(DataPart::Test);
-        if !path.join(scores).exists() {
+        if !EvaluationRecord::is_in(path) {
             return Ok(None);
         }
         let record = EvaluationRecord::read(path)?;
         if record.data.data_digest != dataset.digest {
-            return Err(ReproduceError::OtherData {
-                folder: path.into(),
-                saved: record.data.data_digest,
-                found: dataset.digest.clone(),
-            });
+            return Err(ReproduceError::Refused(format!(
+                "{} holds results on data with digest {}, the data folder has digest {}; {REMEDY}",
+                path.display(),
+                record.data.data_digest,
+                dataset.digest
+            )));
         }
         Ok(Some(record))
-    }
-
-    /// The manifest of the training.
-    ///
-    /// # Errors
-    /// It is damaged.
-    pub fn manifest(&self) -> Result<Option<Manifest>, ReproduceError> {
-        Ok(self.folder.manifest()?)
     }
 
     /// Writes a row's results; the scores last, so that a row with scores is whole.
@@ -86,7 +78,7 @@ impl RowResults {
     ) -> Result<(), ReproduceError> {
         let path = self.folder.path();
         std::fs::create_dir_all(path).map_err(FileError::at(path, "created"))?;
-        replace_file(&self.folder.config_path(), row.config.to_toml()?.as_bytes())?;
+        self.folder.write_config(&row.config)?;
         if let Some(run) = run {
             let manifest = run.manifest_path();
             let content = std::fs::read(&manifest).map_err(FileError::at(&manifest, "read"))?;
@@ -105,54 +97,39 @@ impl RowResults {
             let frame_steps = thousands(last.frame_steps);
             format!("{what} of {}, {frame_steps} frame-steps", row.folder)
         };
-        let write = |name: &str, svg: String| -> Result<(), ReproduceError> {
-            Ok(replace_file(
-                &self.folder.path().join(name),
-                svg.as_bytes(),
-            )?)
+        let points = |of: &dyn Fn(&LogLine) -> Option<f64>| -> Vec<(f64, f64)> {
+            let point = |line: &LogLine| Some((line.frame_steps as f64, of(line)?));
+            log.iter().filter_map(point).collect()
         };
-        let losses = |name: &str, of: &dyn Fn(&LogLine) -> Option<f64>| LossSeries {
-            name: name.into(),
-            points: log
-                .iter()
-                .filter_map(|line| Some((line.frame_steps as f64, of(line)?)))
-                .collect(),
-        };
-        let mut series = vec![losses("total", &|line| Some(line.total))];
-        for name in last.losses.keys() {
-            series.push(losses(name, &|line| line.losses.get(name).copied()));
-        }
-        write(LOSS_CURVE, loss_curve(&title("Losses"), &series)?)?;
-        let scored: Vec<(f64, &Scores)> = log
-            .iter()
-            .filter_map(|line| Some((line.frame_steps as f64, line.validation.as_ref()?)))
-            .collect();
-        let Some((_, last)) = scored.last() else {
+        let mut series = vec![LossSeries {
+            name: "total".into(),
+            points: points(&|line| Some(line.total)),
+        }];
+        series.extend(last.losses.keys().map(|name| LossSeries {
+            name: name.clone(),
+            points: points(&|line| line.losses.get(name).copied()),
+        }));
+        let path = self.folder.path();
+        let losses = loss_curve(&title("Losses"), &series)?;
+        replace_file(&path.join(LOSS_CURVE), losses)?;
+        let mut scored = log.iter().rev().filter_map(|line| line.validation.as_ref());
+        let Some(scores) = scored.next() else {
             return Ok(());
         };
         let protocol = row.config.protocol();
-        let Some((metric, row)) = protocol
-            .metrics()
-            .iter()
-            .find_map(|metric| Some((metric, last.row(metric.key)?)))
-        else {
+        let mut metrics = protocol.metrics().iter();
+        let found = metrics.find_map(|metric| Some((metric, scores.row(metric.key)?)));
+        let Some((metric, row)) = found else {
             return Ok(());
         };
         let columns = row.columns().filter(|column| *column != AVERAGE);
-        let by_column: Vec<ValidationSeries> = columns
-            .map(|column| ValidationSeries {
-                column: column.into(),
-                points: scored
-                    .iter()
-                    .filter_map(|(frame_steps, scores)| {
-                        Some((*frame_steps, scores.row(metric.key)?.at(column)?))
-                    })
-                    .collect(),
-            })
-            .collect();
+        let series = columns.map(|column| ValidationSeries {
+            column: column.into(),
+            points: points(&|line| line.validation.as_ref()?.row(metric.key)?.at(column)),
+        });
         let title = title(&format!("{} on validation clips", metric.title));
-        let curve = validation_curve(&title, metric, &by_column)?;
-        write(VALIDATION_CURVE, curve)
+        let curve = validation_curve(&title, metric, &series.collect::<Vec<_>>())?;
+        Ok(replace_file(&path.join(VALIDATION_CURVE), curve)?)
     }
 
     /// Files that are there, by their names.
@@ -166,42 +143,4 @@ impl RowResults {
             .filter(|path| path.exists())
             .collect()
     }
-}
-
-/// The row in the tables: with its scores, or with why it has none.
-///
-/// # Errors
-/// A file of the results or of the run is damaged.
-pub fn table_row(
-    row: &Row,
-    record: Option<&EvaluationRecord>,
-    results: &RowResults,
-    run: &RunFolder,
-) -> Result<TableRow, ReproduceError> {
-    let manifest = match record {
-        Some(_) => results.manifest()?,
-        None => run.manifest()?,
-    };
-    let note = match (&manifest, record) {
-        _ if !row.is_trained() => NO_TRAINING.into(),
-        (None, _) => "not trained yet".into(),
-        (Some(manifest), None) if manifest.state == RunState::Diverged => format!(
-            "diverged: a loss or gradient was not finite after step {} of {}",
-            manifest.steps_done, manifest.steps
-        ),
-        (Some(manifest), None) if manifest.state == RunState::Finished => {
-            "trained, but not evaluated yet".into()
-        }
-        (Some(manifest), None) => format!(
-            "not trained yet: {} of {} steps at the last checkpoint",
-            manifest.steps_done, manifest.steps
-        ),
-        (Some(manifest), Some(_)) => schedule_note(&row.config, manifest),
-    };
-    Ok(TableRow {
-        name: row.config.name.clone(),
-        seed: row.is_trained().then_some(row.config.seed),
-        scores: record.map(|record| record.scores.clone()),
-        schedule_note: note,
-    })
 }

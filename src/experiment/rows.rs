@@ -63,10 +63,10 @@ pub fn read(
             load(&known).map_err(no_row)?
         };
         if configs.iter().any(|other| other.name == config.name) {
-            return Err(ReproduceError::SameName {
-                folder: folder.into(),
-                name: config.name,
-            });
+            return Err(ReproduceError::Refused(format!(
+                "two configs in {} are called {name}; give each a name of its own",
+                folder.display()
+            )));
         }
         configs.push(config);
     }
@@ -75,16 +75,16 @@ pub fn read(
         Err(_) => configs[0].printed()?,
     };
     let place = |name: &str| printed.rows.iter().position(|row| row.name == name);
-    configs.sort_by_key(|config| {
-        (
-            place(&config.name).unwrap_or(usize::MAX),
-            config.name.clone(),
-        )
+    configs.sort_by_cached_key(|config| {
+        let name = config.name.clone();
+        (place(&name).unwrap_or(usize::MAX), name)
     });
     for (index, Seeds { name, .. }) in seeds.iter().enumerate() {
         known(&configs, name, "--seeds", folder)?;
         if seeds[..index].iter().any(|other| other.name == *name) {
-            return Err(ReproduceError::SeedsTwice { name: name.clone() });
+            return Err(ReproduceError::Refused(format!(
+                "--seeds names {name} twice; give all its seeds in one list"
+            )));
         }
     }
     let (mut rows, mut further) = (Vec::new(), Vec::new());
@@ -138,19 +138,20 @@ pub fn chosen<'r>(
 /// # Errors
 /// Two rows read or split the data otherwise, or the data cannot be used.
 pub fn dataset(rows: &[Row], folder: &Path) -> Result<Dataset, ReproduceError> {
-    let (first, others) = rows.split_first().ok_or(ReproduceError::NoRows)?;
-    for row in others {
-        if row.config.data != first.config.data {
-            let differences = row.config.differences(&ExperimentConfig {
-                data: first.config.data.clone(),
-                ..row.config.clone()
-            })?;
-            return Err(ReproduceError::OtherDataConfig {
-                row: row.folder.clone(),
-                first: first.folder.clone(),
-                differences,
-            });
-        }
+    let no_rows = || ReproduceError::Refused("there are no rows".into());
+    let first = rows.first().ok_or_else(no_rows)?;
+    let other = |row: &&Row| row.config.data != first.config.data;
+    if let Some(row) = rows.iter().find(other) {
+        let differences = row.config.differences(&ExperimentConfig {
+            data: first.config.data.clone(),
+            ..row.config.clone()
+        })?;
+        return Err(ReproduceError::Refused(format!(
+            "rows of one table are on the same data, but {} and {} differ in {}",
+            row.folder,
+            first.folder,
+            differences.join("; ")
+        )));
     }
     Ok(Dataset::load(folder, &first.config.data)?)
 }
@@ -158,40 +159,39 @@ pub fn dataset(rows: &[Row], folder: &Path) -> Result<Dataset, ReproduceError> {
 fn known(
     configs: &[ExperimentConfig],
     name: &str,
-    flag: &'static str,
+    flag: &str,
     folder: &Path,
 ) -> Result<(), ReproduceError> {
     if configs.iter().any(|config| config.name == name) {
         return Ok(());
     }
-    let mut names: Vec<String> = configs.iter().map(|config| config.name.clone()).collect();
+    let mut names: Vec<&str> = configs.iter().map(|config| &*config.name).collect();
     names.dedup();
-    Err(ReproduceError::Unknown {
-        flag,
-        name: name.into(),
-        folder: folder.into(),
-        names,
-    })
+    Err(ReproduceError::Refused(format!(
+        "{flag} {name}: {} has no such config, but {}",
+        folder.display(),
+        names.join(", ")
+    )))
 }
 
 /// The TOML files of a folder, sorted.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, ReproduceError> {
-    let unreadable = |cause| ReproduceError::Folder {
-        folder: folder.into(),
-        cause,
+    let paths: Vec<PathBuf> = std::fs::read_dir(folder)
+        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect())
+        .map_err(|cause| {
+            ReproduceError::Refused(format!(
+                "the folder of configs {} cannot be read: {cause}",
+                folder.display()
+            ))
+        })?;
+    let is_config = |path: &PathBuf| {
+        path.extension().is_some_and(|end| end == "toml")
+            && path.file_name().is_some_and(|name| name != PRINTED)
     };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        let is_config = path.extension().is_some_and(|end| end == "toml");
-        if is_config && path.file_name().is_some_and(|name| name != PRINTED) {
-            files.push(path);
-        }
-    }
+    let mut files: Vec<PathBuf> = paths.into_iter().filter(is_config).collect();
     if files.is_empty() {
-        return Err(ReproduceError::NoConfig {
-            folder: folder.into(),
-        });
+        let folder = folder.into();
+        return Err(ReproduceError::NoConfig { folder });
     }
     files.sort_unstable();
     Ok(files)

@@ -1,16 +1,17 @@
 //! Checkpoints: folders `step-XXXXXXXX` with `weights.safetensors` and `state.bin`, each there whole or not at all.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use thiserror::Error;
 
 use super::durable::{self, FileError};
-use super::state::{self, Header, Moments, StateError};
+use super::error::RunError;
+use super::state::{self, Header, Moments};
 use crate::autograd::Parameters;
 use crate::data::hexadecimal;
-use crate::models::weights::{self, SavedWeights, WeightsError};
+use crate::models::weights::{self, SavedWeights};
 
 /// Name of the weights file, in a checkpoint and in a finished run.
 pub const WEIGHTS_FILE: &str = "weights.safetensors";
@@ -18,25 +19,6 @@ pub const WEIGHTS_FILE: &str = "weights.safetensors";
 pub const STATE_FILE: &str = "state.bin";
 const PREFIX: &str = "step-";
 const PARTIAL: &str = ".partial";
-
-/// Why a checkpoint cannot be used.
-#[derive(Debug, Error)]
-pub enum CheckpointError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    State(#[from] StateError),
-    #[error(transparent)]
-    Weights(#[from] WeightsError),
-    #[error("{path} is damaged: its digest is {found}, the state beside it says {expected}")]
-    OtherWeights {
-        path: PathBuf,
-        found: String,
-        expected: String,
-    },
-    #[error("{problem}")]
-    Misfit { problem: String },
-}
 
 /// A checkpoint, read.
 #[derive(Debug)]
@@ -51,21 +33,18 @@ impl Checkpoint {
     ///
     /// # Errors
     /// A file is missing, damaged, or not of such a model.
-    pub fn read(folder: &Path, parameters: &Parameters<f32>) -> Result<Self, CheckpointError> {
-        let (header, moments) = state::read(
-            &folder.join(STATE_FILE),
-            parameters.weights(),
-            parameters.len(),
-        )?;
+    pub fn read(folder: &Path, parameters: &Parameters<f32>) -> Result<Self, RunError> {
+        let state = folder.join(STATE_FILE);
+        let (header, moments) = state::read(&state, parameters.weights(), parameters.len())?;
         let path = folder.join(WEIGHTS_FILE);
         let content = weights::read_file(&path, parameters.weights())?;
         let found = file_digest(&content);
         if found != header.weights_file_digest {
-            return Err(CheckpointError::OtherWeights {
-                path,
-                found,
-                expected: header.weights_file_digest,
-            });
+            return Err(RunError::Refused(format!(
+                "{} is damaged: its digest is {found}, the state beside it says {}",
+                path.display(),
+                header.weights_file_digest
+            )));
         }
         Ok(Self {
             weights: SavedWeights::parse(&content, &path)?,
@@ -80,27 +59,37 @@ pub(crate) fn file_digest(content: &[u8]) -> String {
     hexadecimal(&Sha256::digest(content))
 }
 
+/// What lies in a folder; nothing where there is no folder.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    fs::read_dir(folder)
+        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect())
+        .map_err(FileError::at(folder, "read"))
+}
+
+/// The name of a file or folder.
+fn name(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
+}
+
 /// The checkpoints in a folder, by step, the newest last; none where there is no folder.
 ///
 /// # Errors
 /// The folder cannot be read.
 pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>, FileError> {
-    let mut found = Vec::new();
-    if folder.exists() {
-        for entry in fs::read_dir(folder).map_err(FileError::at(folder, "read"))? {
-            let entry = entry.map_err(FileError::at(folder, "read"))?;
-            let name = entry.file_name();
-            let step = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
-            if let Some(step) = step.and_then(|digits| digits.parse().ok()) {
-                found.push((step, entry.path()));
-            }
-        }
-    }
+    let step = |path: &Path| name(path).strip_prefix(PREFIX)?.parse().ok();
+    let paths = entries(folder)?.into_iter();
+    let mut found: Vec<_> = paths
+        .filter_map(|path| Some((step(&path)?, path)))
+        .collect();
     found.sort_unstable();
     Ok(found)
 }
 
-/// Writes a checkpoint, then removes all but the newest `keep`. Whenever this stops, the checkpoints before are whole.
+/// Writes a checkpoint, then removes all but the newest `keep`. Whenever this stops, the
+/// checkpoints before are whole.
 pub(crate) fn write(
     folder: &Path,
     step: u64,
@@ -108,32 +97,27 @@ pub(crate) fn write(
     state: &[u8],
     keep: usize,
 ) -> Result<(), FileError> {
-    let name = format!("{PREFIX}{step:08}");
-    let partial = folder.join(format!("{name}{PARTIAL}"));
-    remove(&partial)?;
+    let whole = folder.join(format!("{PREFIX}{step:08}"));
+    let partial = folder.join(format!("{}{PARTIAL}", name(&whole)));
+    durable::remove_folder(&partial)?;
     fs::create_dir_all(&partial).map_err(FileError::at(&partial, "created"))?;
     durable::write_synced(&partial.join(WEIGHTS_FILE), weights)?;
     durable::write_synced(&partial.join(STATE_FILE), state)?;
     durable::sync_folder(&partial)?;
-    let whole = folder.join(name);
-    remove(&whole)?;
+    durable::remove_folder(&whole)?;
     durable::rename(&partial, &whole)?;
     let all = list(folder)?;
     for (_, old) in &all[..all.len().saturating_sub(keep)] {
-        remove(old)?;
+        durable::remove_folder(old)?;
     }
     Ok(())
 }
 
 /// Removes what an interrupted [`write`] left.
 pub(crate) fn remove_partial(folder: &Path) -> Result<(), FileError> {
-    if folder.exists() {
-        for entry in fs::read_dir(folder).map_err(FileError::at(folder, "read"))? {
-            let path = entry.map_err(FileError::at(folder, "read"))?.path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if name.starts_with(PREFIX) && name.ends_with(PARTIAL) {
-                remove(&path)?;
-            }
+    for path in entries(folder)? {
+        if name(&path).starts_with(PREFIX) && name(&path).ends_with(PARTIAL) {
+            durable::remove_folder(&path)?;
         }
     }
     Ok(())
@@ -141,18 +125,7 @@ pub(crate) fn remove_partial(folder: &Path) -> Result<(), FileError> {
 
 /// Moves a damaged checkpoint out of the way, for whoever wants to look at it.
 pub(crate) fn set_aside(path: &Path) -> Result<(), FileError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let aside = path.with_file_name(format!("damaged-{name}"));
-    remove(&aside)?;
+    let aside = path.with_file_name(format!("damaged-{}", name(path)));
+    durable::remove_folder(&aside)?;
     durable::rename(path, &aside)
-}
-
-/// Removes a folder and what it holds, where it exists.
-pub(crate) fn remove(folder: &Path) -> Result<(), FileError> {
-    match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(FileError::at(folder, "removed")(error))
-        }
-        _ => Ok(()),
-    }
 }

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use thiserror::Error;
 
 /// A file or folder that could not be dealt with.
@@ -38,11 +39,34 @@ pub(crate) fn write_synced(path: &Path, content: &[u8]) -> Result<(), FileError>
 }
 
 /// Replaces a file by a whole new one: written beside it, then renamed.
-pub(crate) fn replace(path: &Path, content: &[u8]) -> Result<(), FileError> {
+pub(crate) fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!(".{name}.partial"));
-    write_synced(&partial, content)?;
+    write_synced(&partial, content.as_ref())?;
     rename(&partial, path)
+}
+
+/// Writes JSON for people and scripts, with a final line end, there whole or not at all.
+pub(crate) fn write_json(path: &Path, content: &impl Serialize) -> Result<(), FileError> {
+    let text = serde_json::to_string_pretty(content).map_err(io::Error::from);
+    replace(path, text.map_err(FileError::at(path, "written"))? + "\n")
+}
+
+/// Removes a file where there is one.
+pub(crate) fn remove(path: &Path) -> Result<(), FileError> {
+    or_missing(fs::remove_file(path)).map_err(FileError::at(path, "removed"))
+}
+
+/// Removes a folder and what it holds, where there is one.
+pub(crate) fn remove_folder(path: &Path) -> Result<(), FileError> {
+    or_missing(fs::remove_dir_all(path)).map_err(FileError::at(path, "removed"))
+}
+
+fn or_missing(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        result => result,
+    }
 }
 
 /// Renames within one folder, down to the disk.

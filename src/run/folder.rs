@@ -55,14 +55,9 @@ impl RunFolder {
     pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         if run.config_path().exists() && run.config()?.name == config.name {
-            checkpoint::remove(&run.checkpoints())?;
-            for file in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG].map(|name| path.join(name)) {
-                match fs::remove_file(&file) {
-                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                        return Err(FileError::at(&file, "removed")(error).into());
-                    }
-                    _ => {}
-                }
+            durable::remove_folder(&run.checkpoints())?;
+            for name in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG] {
+                durable::remove(&path.join(name))?;
             }
         }
         run.begin(config)?;
@@ -79,7 +74,7 @@ impl RunFolder {
             run.begin(config)?;
             return Ok(run);
         }
-        run.check_config(config)?;
+        run.check_config(&run.config()?.differences(config)?)?;
         checkpoint::remove_partial(&run.checkpoints())?;
         Ok(run)
     }
@@ -101,28 +96,47 @@ impl RunFolder {
     }
 
     fn begin(&self, config: &ExperimentConfig) -> Result<(), RunError> {
-        let path = &self.path;
-        if [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE]
-            .iter()
-            .any(|name| path.join(name).exists())
-        {
-            return Err(RunError::RunExists { path: path.into() });
+        let own = [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE];
+        if own.iter().any(|name| self.path.join(name).exists()) {
+            return Err(RunError::Refused(format!(
+                "{} holds a run already; go on with --resume, or give another --out",
+                self.path.display()
+            )));
         }
-        durable::replace(&path.join(Self::CONFIG), config.to_toml()?.as_bytes())?;
-        Ok(())
+        self.write_config(config)
     }
 
-    /// Refuses a config that differs from the run's.
-    fn check_config(&self, config: &ExperimentConfig) -> Result<(), RunError> {
-        let differences = self.config()?.differences(config)?;
-        if differences.is_empty() {
-            Ok(())
-        } else {
-            Err(RunError::OtherConfig {
-                path: self.config_path(),
-                differences,
-            })
+    /// Refuses a config that differs from the run's in these keys.
+    pub(crate) fn check_config(&self, differences: &[String]) -> Result<(), RunError> {
+        match differences {
+            [] => Ok(()),
+            _ => Err(RunError::Refused(format!(
+                "{} holds a run with another config ({}); values there, values now; a run is \
+                 resumed with the config and the --set that it was started with",
+                self.config_path().display(),
+                differences.join("; ")
+            ))),
         }
+    }
+
+    /// Refuses data with another digest than `saved`, which `path` was trained on.
+    pub(crate) fn check_data(path: &Path, saved: &str, found: &str) -> Result<(), RunError> {
+        match saved == found {
+            true => Ok(()),
+            false => Err(RunError::Refused(format!(
+                "{} was trained on data with digest {saved}, the data folder now has digest \
+                 {found}",
+                path.display()
+            ))),
+        }
+    }
+
+    /// Writes the resolved config.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn write_config(&self, config: &ExperimentConfig) -> Result<(), RunError> {
+        Ok(durable::replace(&self.config_path(), config.to_toml()?)?)
     }
 
     pub fn path(&self) -> &Path {
@@ -181,46 +195,34 @@ impl RunFolder {
             return Ok(None);
         }
         let text = fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
-        let read = serde_json::from_str(&text).map_err(|cause| RunError::Manifest {
-            path: path.clone(),
-            cause,
-        });
-        let read = read.and_then(|manifest: Manifest| match manifest.format {
-            ..=manifest::FORMAT => Ok(manifest),
-            found => Err(RunError::ManifestFormat {
-                path,
-                found,
-                newest: manifest::FORMAT,
-            }),
-        });
-        match read {
-            Ok(manifest) => Ok(Some(manifest)),
-            Err(error) => Err(self.or_other_version(error)),
-        }
+        let problem = match serde_json::from_str::<Manifest>(&text) {
+            Ok(manifest) if manifest.format <= manifest::FORMAT => return Ok(Some(manifest)),
+            Ok(Manifest { format, .. }) => format!(
+                "has format {format}, and this version of keydance knows formats up to {}",
+                manifest::FORMAT
+            ),
+            Err(cause) => format!("is not a manifest: {cause}"),
+        };
+        let error = RunError::Refused(format!("{} {problem}", path.display()));
+        Err(self.or_other_version(error))
     }
 
-    /// The error, with the version of the program that made the run where it is another one.
+    /// The error, with the version of the program that made the run where it is another one: what
+    /// such a run holds cannot always be read or gone on with.
     pub(crate) fn or_other_version(&self, error: RunError) -> RunError {
         let text = fs::read_to_string(self.path.join(MANIFEST)).unwrap_or_default();
+        let this = Build::this();
         match serde_json::from_str::<Build>(&text) {
-            Ok(made_by) if made_by != Build::this() => RunError::OtherVersion {
-                path: self.path.clone(),
-                made_by: made_by.to_string(),
-                this: Build::this().to_string(),
-                cause: Box::new(error),
-            },
+            Ok(made_by) if made_by != this => RunError::Refused(format!(
+                "{} was made by keydance {made_by}, this is {this}, which cannot use it: {error}",
+                self.path.display()
+            )),
             _ => error,
         }
     }
 
-    pub(crate) fn write_manifest(&self, manifest: &Manifest) -> Result<(), RunError> {
-        let path = self.manifest_path();
-        let mut text = serde_json::to_vec_pretty(manifest).map_err(|cause| RunError::Manifest {
-            path: path.clone(),
-            cause,
-        })?;
-        text.push(b'\n');
-        Ok(durable::replace(&path, &text)?)
+    pub(crate) fn write_manifest(&self, manifest: &Manifest) -> Result<(), FileError> {
+        durable::write_json(&self.manifest_path(), manifest)
     }
 
     pub(crate) fn write_weights(&self, content: &[u8]) -> Result<(), FileError> {

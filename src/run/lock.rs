@@ -28,9 +28,11 @@ impl FolderLock {
         let file = File::create(&path).map_err(FileError::at(&path, "created"))?;
         match file.try_lock() {
             Ok(()) => Ok(Self { file: Some(file) }),
-            Err(TryLockError::WouldBlock) => Err(RunError::Locked {
-                path: folder.into(),
-            }),
+            Err(TryLockError::WouldBlock) => Err(RunError::Refused(format!(
+                "another training writes to {} at this moment; wait for its end or stop it, or \
+                 give another --out",
+                folder.display()
+            ))),
             Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
                 Ok(Self { file: None })
             }

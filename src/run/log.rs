@@ -39,10 +39,11 @@ pub(crate) fn read(path: &Path) -> Result<Vec<LogLine>, RunError> {
     let text = std::fs::read_to_string(path).map_err(FileError::at(path, "read"))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let parse = |(index, line)| {
-        serde_json::from_str(line).map_err(|cause| RunError::Log {
-            path: path.into(),
-            line: index + 1,
-            cause,
+        serde_json::from_str(line).map_err(|cause| {
+            let (path, line) = (path.display(), index + 1);
+            RunError::Refused(format!(
+                "{path}, line {line}, is no line of a training's log: {cause}"
+            ))
         })
     };
     whole.lines().enumerate().map(parse).collect()

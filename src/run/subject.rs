@@ -1,60 +1,13 @@
 //! The model that a command works with: a trained run's, or one that needs no training.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::durable::{self, FileError};
+use super::durable::FileError;
 use super::error::RunError;
 use super::folder::RunFolder;
 use crate::data::Dataset;
-use crate::experiment::{ConfigError, ExperimentConfig};
+use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
-
-/// Why there is no model to work with, or why it does not go with the data.
-#[derive(Debug, thiserror::Error)]
-pub enum SubjectError {
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(
-        "{path} describes a model that is trained; train it with `keydance train {path} --data DIR --out RUN_DIR` and \
-         give RUN_DIR instead"
-    )]
-    Untrained { path: PathBuf },
-    #[error(
-        "{path} is not a run's folder: it has no {}; `keydance train` makes one",
-        RunFolder::CONFIG
-    )]
-    NoRun { path: PathBuf },
-    #[error(
-        "{run} was trained on other clips or features of the data ({}; values there, values now), so some of these may be its \
-         training clips; give --other-data to use it on them all the same",
-        differences.join("; ")
-    )]
-    OtherClips {
-        run: PathBuf,
-        differences: Vec<String>,
-    },
-    #[error(
-        "{name} was trained on data with digest {trained}, {folder} has digest {found}; give --other-data to use it there all the same"
-    )]
-    OtherData {
-        name: String,
-        trained: String,
-        folder: PathBuf,
-        found: String,
-    },
-    #[error(
-        "{folder} holds scores of another config ({}); values there, values now; give another --out",
-        differences.join("; ")
-    )]
-    OtherScores {
-        folder: PathBuf,
-        differences: Vec<String>,
-    },
-}
 
 /// A model to work with, its config, and where they come from.
 pub struct Subject {
@@ -72,13 +25,16 @@ impl Subject {
     ///
     /// # Errors
     /// There is no such run or config, its model is not trained, or its weights are damaged.
-    pub fn open(path: &Path, set: &[String]) -> Result<Self, SubjectError> {
+    pub fn open(path: &Path, set: &[String]) -> Result<Self, RunError> {
         if !path.is_dir() {
             let config = ExperimentConfig::load(path, set)?;
-            let model = config
-                .model
-                .untrained(&config.data)
-                .ok_or_else(|| SubjectError::Untrained { path: path.into() })?;
+            let model = config.model.untrained(&config.data).ok_or_else(|| {
+                let path = path.display();
+                RunError::Refused(format!(
+                    "{path} describes a model that is trained; train it with `keydance train \
+                         {path} --data DIR --out RUN_DIR` and give RUN_DIR instead"
+                ))
+            })?;
             return Ok(Self {
                 what: format!("{} of {}", config.name, path.display()),
                 config,
@@ -88,7 +44,11 @@ impl Subject {
         }
         let run = RunFolder::open(path);
         if !run.config_path().exists() {
-            return Err(SubjectError::NoRun { path: path.into() });
+            return Err(RunError::Refused(format!(
+                "{} is not a run's folder: it has no {}; `keydance train` makes one",
+                path.display(),
+                RunFolder::CONFIG
+            )));
         }
         let config = ExperimentConfig::load(&run.config_path(), set)?;
         let (model, what) = match config.model.untrained(&config.data) {
@@ -112,7 +72,7 @@ impl Subject {
     /// # Errors
     /// The config reads or splits the data otherwise than the run's, or the data has another digest
     /// than the run's manifest says.
-    pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), SubjectError> {
+    pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), RunError> {
         let Some(run) = &self.run else {
             return Ok(());
         };
@@ -123,20 +83,25 @@ impl Subject {
                 ..ExperimentConfig::default()
             };
             let differences = config(trained).differences(&config(self.config.data.clone()))?;
-            return Err(SubjectError::OtherClips {
-                run: run.path().into(),
-                differences,
-            });
+            return Err(RunError::Refused(format!(
+                "{} was trained on other clips or features of the data ({}; values there, values \
+                 now), so some of these may be its training clips; give --other-data to use it on \
+                 them all the same",
+                run.path().display(),
+                differences.join("; ")
+            )));
         }
         if let Some(manifest) = run.manifest()?
             && manifest.data_digest != dataset.digest
         {
-            return Err(SubjectError::OtherData {
-                name: manifest.name,
-                trained: manifest.data_digest,
-                folder: folder.into(),
-                found: dataset.digest.clone(),
-            });
+            return Err(RunError::Refused(format!(
+                "{} was trained on data with digest {}, {} has digest {}; give --other-data to use \
+                 it there all the same",
+                manifest.name,
+                manifest.data_digest,
+                folder.display(),
+                dataset.digest
+            )));
         }
         Ok(())
     }
@@ -149,7 +114,7 @@ impl Subject {
     pub fn scores_folder<'a>(
         &'a self,
         out: Option<&'a Path>,
-    ) -> Result<Option<&'a Path>, SubjectError> {
+    ) -> Result<Option<&'a Path>, RunError> {
         if let Some(run) = &self.run {
             return Ok(Some(run.path()));
         }
@@ -161,13 +126,15 @@ impl Subject {
         if run.config_path().exists() {
             let differences = run.config()?.differences(&self.config)?;
             if !differences.is_empty() {
-                return Err(SubjectError::OtherScores {
-                    folder: folder.into(),
-                    differences,
-                });
+                return Err(RunError::Refused(format!(
+                    "{} holds scores of another config ({}); values there, values now; give \
+                     another --out",
+                    folder.display(),
+                    differences.join("; ")
+                )));
             }
         }
-        durable::replace(&run.config_path(), self.config.to_toml()?.as_bytes())?;
+        run.write_config(&self.config)?;
         Ok(Some(folder))
     }
 }

@@ -21,9 +21,11 @@ impl RunFolder {
         }
         match checkpoint::list(&self.checkpoints())?.pop() {
             Some((_, newest)) => Ok(newest.join(WEIGHTS_FILE)),
-            None => Err(RunError::NoWeights {
-                path: self.path().into(),
-            }),
+            None => Err(RunError::Refused(format!(
+                "{} holds no weights, neither of a finished training nor of a checkpoint; train \
+                 it with `keydance train`",
+                self.path().display()
+            ))),
         }
     }
 
@@ -49,17 +51,18 @@ impl RunFolder {
     fn read_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
         let path = self.newest_weights()?;
         let saved = SavedWeights::read(&path)?;
-        let origin = format!("the config in {}", path.display());
+        let path = path.display();
+        let trained = ExperimentConfig::parse(&saved.config, &format!("the config in {path}"))?;
+        let mut differences = trained.training_differences(config)?;
         // Only the model's table concerns the weights.
-        let trained = ExperimentConfig::parse(&saved.config, &origin)?;
-        let differences: Vec<String> = trained
-            .training_differences(config)?
-            .into_iter()
-            .filter(|difference| difference.starts_with("model."))
-            .collect();
+        differences.retain(|difference| difference.starts_with("model."));
         match differences.is_empty() {
             true => Ok(saved),
-            false => Err(RunError::OtherModel { path, differences }),
+            false => Err(RunError::Refused(format!(
+                "{path} holds the weights of another model than the config describes ({}); values \
+                 there, values of the config",
+                differences.join("; ")
+            ))),
         }
     }
 }

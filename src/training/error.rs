@@ -2,9 +2,7 @@
 
 use thiserror::Error;
 
-use crate::autograd::AutogradError;
 use crate::data::EmptyPart;
-use crate::evaluation::EvaluationError;
 use crate::models::ModelError;
 use crate::run::{FileError, RunError};
 
@@ -15,19 +13,9 @@ pub enum TrainingError {
     Run(#[from] RunError),
     #[error(transparent)]
     Model(#[from] ModelError),
-    #[error("no pool of {threads} threads: {cause}")]
-    Threads {
-        threads: usize,
-        cause: rayon::ThreadPoolBuildError,
-    },
-    /// An operation of the network refused its operands.
-    #[error("step {step} ({what}): {cause}")]
-    Step {
-        step: u64,
-        /// What the step trains.
-        what: String,
-        cause: Box<AutogradError>,
-    },
+    /// What is asked for cannot be trained: what, and what to do.
+    #[error("{0}")]
+    Refused(String),
     /// The training diverged, at this step or, where its cause are the weights, in the update that ended it.
     #[error(
         "step {step} ({what}) is not finite: {cause}; the last checkpoint is as it was; \
@@ -41,19 +29,11 @@ pub enum TrainingError {
         /// Operation and shapes.
         cause: String,
     },
-    #[error("step {step} cannot be scored on the validation clips: {cause}")]
-    Validation {
-        step: u64,
-        cause: Box<EvaluationError>,
-    },
     #[error(
-        "validation.every_steps needs validation clips; set some aside with data.validation_share, such as 0.1, or leave [validation] out"
+        "validation.every_steps needs validation clips; set some aside with data.validation_share, \
+         such as 0.1, or leave [validation] out"
     )]
     NoValidationClips(#[from] EmptyPart),
-    #[error(
-        "validation.lengths has {length}, but the longest of the validation clips has {longest} frames; give lengths of fewer frames"
-    )]
-    ValidationLength { length: usize, longest: usize },
 }
 
 impl From<FileError> for TrainingError {

@@ -101,6 +101,6 @@ impl<'r> Record<'r> {
         self.manifest.steps_done = trainer.steps_done();
         self.manifest.frame_steps_done = trainer.frame_steps;
         self.manifest.seconds = self.seconds_before + self.start.elapsed().as_secs_f64();
-        self.run.write_manifest(&self.manifest)
+        Ok(self.run.write_manifest(&self.manifest)?)
     }
 }

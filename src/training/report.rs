@@ -1,21 +1,22 @@
 //! What one step did.
 
-use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use crate::evaluation::Scores;
 
 /// What one step did: a line of `log.jsonl`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepReport {
     /// Steps done, this one included.
     pub step: u64,
     /// The task's own columns.
+    #[serde(flatten, serialize_with = "by_name")]
     pub columns: Vec<(&'static str, Value)>,
     /// The loss that is minimised.
     pub total: f64,
     /// Its terms by name, not weighted.
+    #[serde(serialize_with = "by_name")]
     pub losses: Vec<(&'static str, f64)>,
     pub learning_rate: f64,
     /// Norm of the gradient over all parameters, before any clipping.
@@ -26,6 +27,7 @@ pub struct StepReport {
     pub seconds: f64,
     pub frame_steps_per_second: f64,
     /// Scores on validation clips after the step, where it was scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<Scores>,
 }
 
@@ -37,32 +39,9 @@ impl StepReport {
     }
 }
 
-/// Loss terms as a map in their order.
-struct ByName<'a>(&'a [(&'static str, f64)]);
-
-impl Serialize for ByName<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().copied())
-    }
-}
-
-impl Serialize for StepReport {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("step", &self.step)?;
-        for (name, value) in &self.columns {
-            map.serialize_entry(name, value)?;
-        }
-        map.serialize_entry("total", &self.total)?;
-        map.serialize_entry("losses", &ByName(&self.losses))?;
-        map.serialize_entry("learning_rate", &self.learning_rate)?;
-        map.serialize_entry("gradient_norm", &self.gradient_norm)?;
-        map.serialize_entry("frame_steps", &self.frame_steps)?;
-        map.serialize_entry("seconds", &self.seconds)?;
-        map.serialize_entry("frame_steps_per_second", &self.frame_steps_per_second)?;
-        if let Some(validation) = &self.validation {
-            map.serialize_entry("validation", validation)?;
-        }
-        map.end()
-    }
+fn by_name<V: Serialize, S: Serializer>(
+    entries: &[(&'static str, V)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(entries.iter().map(|(name, value)| (name, value)))
 }

@@ -1,11 +1,11 @@
 //! Taking a training up where a checkpoint left it.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::trainer::Trainer;
 use crate::experiment::ExperimentConfig;
-use crate::run::checkpoint::{self, Checkpoint, CheckpointError};
-use crate::run::state::Header;
+use crate::run::checkpoint::{self, Checkpoint};
 use crate::run::{RunError, RunFolder};
 
 /// Where a training goes on.
@@ -49,68 +49,55 @@ impl Trainer<'_> {
                 }
             }
         }
-        if damaged.is_empty() {
-            Ok(Resumed { steps: 0, damaged })
-        } else {
-            Err(RunError::NoCheckpoint {
-                path: run.path().into(),
-                problems: damaged,
-            })
+        match damaged.is_empty() {
+            true => Ok(Resumed { steps: 0, damaged }),
+            false => Err(RunError::Refused(format!(
+                "no checkpoint of {} can be used: {}",
+                run.path().display(),
+                damaged.join("; ")
+            ))),
         }
     }
 
     fn take_up(&mut self, checkpoint: Checkpoint, path: &Path) -> Result<(), RunError> {
-        let Header {
-            steps,
-            epoch,
-            position,
-            frame_steps,
-            config_digest,
-            data_digest,
-            ..
-        } = checkpoint.header;
-        let own_digest = checkpoint::file_digest(self.config_toml.as_bytes());
+        let Checkpoint {
+            header,
+            moments,
+            weights,
+        } = checkpoint;
+        let digest = checkpoint::file_digest(self.config_toml.as_bytes());
         // Another version may write the same config with more keys.
-        if config_digest != own_digest
-            && ExperimentConfig::parse(&checkpoint.weights.config, "the checkpoint's config")?
-                != self.config
+        if header.config_digest != digest
+            && ExperimentConfig::parse(&weights.config, "the checkpoint's config")? != self.config
         {
-            return Err(RunError::OtherRun {
-                path: path.into(),
-                saved: config_digest,
-                found: own_digest,
-            });
-        }
-        if data_digest != self.dataset.digest {
-            return Err(RunError::OtherData {
-                path: path.into(),
-                saved: data_digest,
-                found: self.dataset.digest.clone(),
-            });
-        }
-        let misfit = |problem: String| RunError::Checkpoint {
-            path: path.into(),
-            problem: CheckpointError::Misfit { problem },
-        };
-        let place = self.task.place(steps);
-        if steps > self.task.steps() || place != [epoch, position] {
-            return Err(misfit(format!(
-                "step {steps} at batch {position} of epoch {epoch}, where the schedule has batch {} of epoch {}",
-                place[1], place[0]
+            return Err(RunError::Refused(format!(
+                "{} belongs to a config with digest {}, the run's config has digest {digest}",
+                path.display(),
+                header.config_digest
             )));
         }
-        let statistics = self.task.statistics();
-        checkpoint
-            .weights
-            .load_into(&mut self.parameters, &statistics)
-            .map_err(|error| RunError::Checkpoint {
-                path: path.into(),
-                problem: error.into(),
-            })?;
+        RunFolder::check_data(path, &header.data_digest, &self.dataset.digest)?;
+        let misfit = |problem: &dyn Display| {
+            RunError::Refused(format!(
+                "{} does not fit the model: {problem}",
+                path.display()
+            ))
+        };
+        let (steps, found) = (header.steps, [header.epoch, header.position]);
+        let place = self.task.place(steps);
+        if steps > self.task.steps() || place != found {
+            return Err(misfit(&format_args!(
+                "step {steps} at batch {} of epoch {}, where the schedule has batch {} of epoch {}",
+                found[1], found[0], place[1], place[0]
+            )));
+        }
+        weights
+            .load_into(&mut self.parameters, &self.task.statistics())
+            .map_err(|error| misfit(&error))?;
         self.adam
-            .restore(steps, checkpoint.moments)
-            .map_err(|_| misfit("its moments have other sizes than the weights".into()))?;
-        self.frame_steps = frame_steps;
+            .restore(steps, moments)
+            .map_err(|_| misfit(&"its moments have other sizes than the weights"))?;
+        self.frame_steps = header.frame_steps;
         Ok(())
     }
 }

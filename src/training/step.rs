@@ -45,7 +45,9 @@ impl Stepper {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .map_err(|cause| TrainingError::Threads { threads, cause })?;
+            .map_err(|cause| {
+                TrainingError::Refused(format!("no pool of {threads} threads: {cause}"))
+            })?;
         Ok(Self {
             pool,
             workspaces: Mutex::new(Vec::new()),
@@ -213,11 +215,10 @@ fn run_shard(
 fn failure(input: StepInput<'_>, cause: AutogradError) -> TrainingError {
     match cause {
         AutogradError::NonFinite { .. } => non_finite(input, cause.to_string()),
-        cause => TrainingError::Step {
-            step: input.done + 1,
-            what: input.step.describe(),
-            cause: Box::new(cause),
-        },
+        cause => {
+            let (step, what) = (input.done + 1, input.step.describe());
+            TrainingError::Refused(format!("step {step} ({what}): {cause}"))
+        }
     }
 }
 

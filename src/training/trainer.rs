@@ -10,7 +10,7 @@ use super::step::{StepInput, Stepper};
 use super::validation::Validation;
 use crate::autograd::Parameters;
 use crate::data::Dataset;
-use crate::experiment::{ConfigError, ExperimentConfig};
+use crate::experiment::ExperimentConfig;
 use crate::models::settings::{InitialRng, TaskSetting};
 use crate::models::{Generator, ModelError, Streams, Task, weights};
 use crate::nn::Initialiser;
@@ -71,12 +71,9 @@ impl<'d> Trainer<'d> {
             &mut Initialiser<'_, f32, InitialRng>,
         ) -> Result<Box<dyn Task<f32> + 'd>, ModelError>,
     ) -> Result<Self, TrainingError> {
-        config.validate().map_err(|cause| {
-            RunError::from(ConfigError::Value {
-                origin: "the config".into(),
-                cause,
-            })
-        })?;
+        config
+            .validate()
+            .map_err(|cause| TrainingError::Refused(format!("the config: {cause}")))?;
         let streams = Streams::new(config.seed);
         let mut parameters = Parameters::new();
         let setting = TaskSetting {
@@ -237,9 +234,11 @@ impl<'d> Trainer<'d> {
         if let Some(validation) = validation.filter(due) {
             let model = self.model();
             let scores = self.stepper.install(|| validation.score(&*model));
-            report.validation = Some(scores.map_err(|cause| TrainingError::Validation {
-                step: report.step,
-                cause: Box::new(cause),
+            report.validation = Some(scores.map_err(|cause| {
+                TrainingError::Refused(format!(
+                    "step {} cannot be scored on the validation clips: {cause}",
+                    report.step
+                ))
             })?);
         }
         Ok(report)

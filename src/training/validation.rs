@@ -39,7 +39,10 @@ impl<'d> Validation<'d> {
         let longest = frames.map(Recording::frames).max().unwrap_or(0);
         let mut lengths = protocol.lengths().iter();
         match lengths.find(|&&length| length >= longest) {
-            Some(&length) => Err(TrainingError::ValidationLength { length, longest }),
+            Some(length) => Err(TrainingError::Refused(format!(
+                "validation.lengths has {length}, but the longest of the validation clips has \
+                 {longest} frames; give lengths of fewer frames"
+            ))),
             None => Ok(Some(Self {
                 dataset,
                 protocol,

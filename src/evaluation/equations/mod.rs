@@ -3,8 +3,6 @@
 mod metrics;
 mod window_request;
 
-use std::fmt;
-
 use rayon::prelude::*;
 
 use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
@@ -86,28 +84,6 @@ impl Default for Equations {
     }
 }
 
-/// A clip that is shorter than a window; its `Display` is the warning.
-struct SkippedClip<'c> {
-    clip: &'c str,
-    /// Number of frames that it has.
-    frames: usize,
-    /// N of the windows that it is too short for.
-    length: usize,
-}
-
-impl fmt::Display for SkippedClip<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} has {} frames, fewer than a window of {} (N = {}): left out of the scores at this length",
-            self.clip,
-            self.frames,
-            self.length + 1,
-            self.length
-        )
-    }
-}
-
 impl Protocol for Equations {
     fn metrics(&self) -> &[Metric] {
         &METRICS
@@ -171,7 +147,11 @@ impl Equations {
         let mut warnings = Vec::new();
         for &length in &self.lengths {
             if length == 0 {
-                return Err(EvaluationError::ZeroLength);
+                return Err(EvaluationError::Data {
+                    reason:
+                        "a length of 0 frames has nothing to predict; give lengths of 1 or more"
+                            .into(),
+                });
             }
             let mut cut = windows(&clip_frames, length);
             if cut.windows.is_empty() {
@@ -183,12 +163,13 @@ impl Equations {
                 });
             }
             warnings.extend(cut.skipped.iter().map(|&clip| {
-                let skipped = SkippedClip {
-                    clip: &clips[clip].name,
-                    frames: clip_frames[clip],
-                    length,
-                };
-                skipped.to_string()
+                format!(
+                    "{} has {} frames, fewer than a window of {} (N = {length}): left out of the \
+                     scores at this length",
+                    clips[clip].name,
+                    clip_frames[clip],
+                    length + 1
+                )
             }));
             if let Some(most) = self.most_windows {
                 cut.windows = spread(&cut.windows, most);
@@ -204,30 +185,23 @@ impl Equations {
     /// The scores of the windows of each length.
     fn scores(&self, measured: &[(usize, Vec<WindowScores>)]) -> Scores {
         let row = |score: &dyn Fn(&[WindowScores]) -> f64| {
-            ScoreRow::new(
-                measured
-                    .iter()
-                    .map(|(length, windows)| (length, score(windows))),
-            )
-            .with_average()
+            let scored = measured.iter();
+            ScoreRow::new(scored.map(|(length, windows)| (length, score(windows)))).with_average()
         };
-        let means =
-            |windows: &[WindowScores]| means(windows, self.velocity_threshold, self.root_threshold);
-        let mut rows = vec![
-            (METRICS[0].key, row(&|windows| means(windows)[0])),
-            (METRICS[1].key, row(&|windows| means(windows)[1])),
-            (METRICS[2].key, row(&|windows| means(windows)[2])),
-        ];
-        let skates: Option<Vec<(usize, f64)>> = measured
-            .iter()
-            .map(|(length, windows)| Some((*length, foot_skate(windows)?)))
+        let (velocity, root) = (self.velocity_threshold, self.root_threshold);
+        let mut rows: Vec<_> = (0..3)
+            .map(|metric| row(&|windows| means(windows, velocity, root)[metric]))
             .collect();
-        if let Some(skates) = skates {
-            rows.push((METRICS[3].key, ScoreRow::new(skates).with_average()));
+        let skate = |windows: &[WindowScores]| foot_skate(windows).unwrap_or(f64::NAN);
+        if measured
+            .iter()
+            .all(|(_, windows)| skate(windows).is_finite())
+        {
+            rows.push(row(&skate));
         }
         let counts = measured.iter();
         Scores::new(
-            rows,
+            METRICS.iter().map(|metric| metric.key).zip(rows),
             counts.map(|(length, windows)| (length, windows.len())),
         )
     }
@@ -266,52 +240,49 @@ fn measure_chunk(
         .iter()
         .map(|window| window_features(&clips[window.clip].features, window.start, length))
         .collect();
-    let requests: Vec<_> = chunk
-        .iter()
-        .zip(&recorded)
+    let windows = || chunk.iter().zip(&recorded);
+    let requests: Vec<_> = windows()
         .map(|(window, features)| {
             let clip = &clips[window.clip];
             window_request(&clip.clip, window.start, features.view()).ok_or_else(|| {
+                let (poses, frames) = (clip.clip.poses.len(), clip.features.nrows());
                 EvaluationError::Data {
                     reason: format!(
-                        "{}: has {} poses but features of {} frames",
-                        clip.name,
-                        clip.clip.poses.len(),
-                        clip.features.nrows()
+                        "{}: has {poses} poses but features of {frames} frames",
+                        clip.name
                     ),
                 }
             })
         })
         .collect::<Result<_, _>>()?;
-    let predicted = model
-        .raw(&requests)
-        .map_err(|source| EvaluationError::Chunk {
-            model: model.name().to_string(),
-            length,
-            clip: clips[chunk[0].clip].name.clone(),
-            start: chunk[0].start,
-            source: Box::new(source),
-        })?;
+    let failed = |what: String, source| EvaluationError::Model {
+        what: format!("{}, {what}", model.name()),
+        source: Box::new(source),
+    };
+    let predicted = model.raw(&requests).map_err(|source| {
+        let Window { clip, start, .. } = chunk[0];
+        let clip = &clips[clip].name;
+        let what =
+            format!("a chunk of windows at N = {length} that starts with {clip}, frame {start}");
+        failed(what, source)
+    })?;
     if predicted.len() != chunk.len() {
-        return Err(EvaluationError::Count {
-            model: model.name().to_string(),
-            expected: chunk.len(),
-            found: predicted.len(),
+        return Err(EvaluationError::Data {
+            reason: format!(
+                "{} gave {} answers to {} requests",
+                model.name(),
+                predicted.len(),
+                chunk.len()
+            ),
         });
     }
-    chunk
-        .iter()
-        .zip(&recorded)
+    windows()
         .zip(&predicted)
         .map(|((window, recorded), predicted)| {
             window_scores(recorded.view(), predicted.view()).map_err(|source| {
-                EvaluationError::Prediction {
-                    model: model.name().to_string(),
-                    clip: clips[window.clip].name.clone(),
-                    start: window.start,
-                    end: window.start + length,
-                    source: Box::new(source),
-                }
+                let (clip, start) = (&clips[window.clip].name, window.start);
+                let end = start + length;
+                failed(format!("{clip}, frames {start} to {end}"), source)
             })
         })
         .collect()

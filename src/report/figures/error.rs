@@ -2,13 +2,13 @@
 
 use crate::models::ModelError;
 use crate::report::FigureError;
-use crate::run::{FileError, SubjectError};
+use crate::run::{FileError, RunError};
 use crate::synthesis::SynthesisError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum FiguresError {
     #[error(transparent)]
-    Subject(#[from] SubjectError),
+    Run(#[from] RunError),
     #[error(
         "{other} was made for data at another rate, or with another mapping, contact threshold or facing_sigma than {subject}: \
          they cannot be compared"
