@@ -1,4 +1,4 @@
-//! The autograd engine, motions and data sets.
+//! The autograd engine, motions, data sets, and what a training goes on with.
 
 // What several of these tests need.
 #[path = "../common/martial_data.rs"]
@@ -16,3 +16,5 @@ mod dataset;
 mod features;
 mod fit;
 mod mapping;
+mod run_state;
+mod streams;

@@ -5,8 +5,8 @@ use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
 use crate::evaluation::equations::{WindowScores, window_scores};
 use crate::motion::placement::world_positions;
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, PathView, Placing, ReportError, Shown};
 use ndarray::s;
 
 /// Frames from one drawn dancer to the next.
@@ -22,7 +22,7 @@ pub struct Entry {
 }
 
 /// Figure 11: motions and root trajectories of the models.
-pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let mut said = Vec::new();
@@ -59,7 +59,7 @@ pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresErro
 }
 
 /// Figure 12: the recorded motion and every model's.
-pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let recorded = positions(stage.shown().recorded.view());
     let mut rows = vec![MotionRow::between_keyframes(
@@ -82,7 +82,7 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresErro
                 window_scores(window.recorded.view(), generated.frames.slice(s![1.., ..]))
             })
             .collect::<Result<_, _>>()
-            .map_err(|source| FiguresError::Scores {
+            .map_err(|source| ReportError::Scores {
                 model: entry.name.clone(),
                 source,
             })?;

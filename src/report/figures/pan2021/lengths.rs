@@ -6,8 +6,8 @@ use super::velocity::{asked_after, mean_parts};
 use super::wording::{mean, percent};
 use crate::models::Generator;
 use crate::models::transition::effect::{FOLLOWED, mean_velocity_factors};
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, ReportError, Shown};
 use ndarray::s;
 
 /// Transition lengths of the paper's figure, frames.
@@ -16,7 +16,7 @@ const LENGTHS: [usize; 4] = [100, 150, 200, 250];
 const DANCERS: usize = 25;
 
 /// The trajectory is gone in more time, the velocity factors keep their values.
-pub fn figure_10(stage: &Stage, model: &dyn Generator) -> Result<Figure, FiguresError> {
+pub fn figure_10(stage: &Stage, model: &dyn Generator) -> Result<Figure, ReportError> {
     let name = model.name();
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();

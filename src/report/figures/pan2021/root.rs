@@ -7,8 +7,8 @@ use super::wording::{Verdict, mean, percent};
 use crate::evaluation::equations::Equations;
 use crate::models::Generator;
 use crate::models::transition::effect::{Response, body_distance, root_response};
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, PathView, ReportError, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
@@ -21,7 +21,7 @@ const DETOUR: f64 = 60.0;
 
 /// Figure 5: generated motions and their root trajectories beside the targets. `plain`: the model
 /// under the clips' own controls.
-pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, FiguresError> {
+pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let pairs = stage.windows().iter().zip(plain);
@@ -79,7 +79,7 @@ pub fn figure_6(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let lowered = stage.generate(model, |request| Ok(request.raised(-HEIGHT)))?;
     let raised = stage.generate(model, |request| Ok(request.raised(HEIGHT)))?;
@@ -127,7 +127,7 @@ pub fn figure_7(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let paths: [(&str, &[f64]); 3] = [
         ("to the left", &[1.0]),
         ("to the right", &[-1.0]),

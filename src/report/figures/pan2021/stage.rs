@@ -4,13 +4,12 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
-use crate::models::transition::DanceClip;
-use crate::models::transition::{check_frames, window_features};
+use crate::models::transition::{DanceClip, check_frames, window_features};
 use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
-use crate::report::figures::FiguresError;
+use crate::report::ReportError;
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 /// Windows that a model predicts in one call.
@@ -52,12 +51,10 @@ impl<'d> Stage<'d> {
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
-    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, FiguresError> {
+    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, ReportError> {
         let needed = choice.length + 1;
-        let mut fitting: Vec<&DanceClip> = clips
-            .iter()
-            .filter(|clip| clip.frames() >= needed)
-            .collect();
+        let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
+        let mut fitting: Vec<&DanceClip> = fitting.collect();
         fitting.sort_by(|a, b| a.name.cmp(&b.name));
         let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
         let first = match choice.clip {
@@ -65,18 +62,19 @@ impl<'d> Stage<'d> {
             Some(name) => fitting
                 .iter()
                 .position(|clip| clip.name == name)
-                .ok_or_else(|| FiguresError::NoClip {
-                    name: name.into(),
-                    needed,
-                    clips: fitting.iter().map(|clip| clip.name.clone()).collect(),
+                .ok_or_else(|| {
+                    let names: Vec<&str> = fitting.iter().map(|clip| clip.name.as_str()).collect();
+                    ReportError::Refused(format!(
+                        "--clip {name} is not among the test clips with {needed} frames or more: {}",
+                        names.join(", ")
+                    ))
                 })?,
         };
         if fitting.is_empty() {
-            return Err(FiguresError::TooShort {
-                length: choice.length,
-                needed,
-                longest,
-            });
+            return Err(ReportError::Refused(format!(
+                "no test clip has the {needed} frames of --length {} (the longest has {longest})",
+                choice.length
+            )));
         }
         fitting[..=first].rotate_right(1);
         let mut windows = Vec::with_capacity(fitting.len());
@@ -87,13 +85,12 @@ impl<'d> Stage<'d> {
                 _ => last / 2,
             };
             if start > last {
-                return Err(FiguresError::Start {
-                    start,
-                    clip: clip.name.clone(),
-                    frames: clip.frames(),
-                    needed,
-                    last,
-                });
+                return Err(ReportError::Refused(format!(
+                    "--start {start}: {} has {} frames, so a window of {needed} starts at frame \
+                     {last} at the latest",
+                    clip.name,
+                    clip.frames()
+                )));
             }
             windows.push(Window {
                 clip,
@@ -137,7 +134,7 @@ impl<'d> Stage<'d> {
         &self,
         model: &dyn Generator,
         change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
-    ) -> Result<Vec<Generated>, FiguresError> {
+    ) -> Result<Vec<Generated>, ReportError> {
         let requests: Vec<SequenceRequest> = self
             .windows
             .iter()
@@ -171,12 +168,8 @@ impl Window<'_> {
     /// "NAME, frames 120 to 220 (N = 100)".
     pub fn describe(&self) -> String {
         let length = self.recorded.nrows() - 1;
-        format!(
-            "{}, frames {} to {} (N = {length})",
-            self.clip.name,
-            self.start,
-            self.start + length
-        )
+        let (clip, start, end) = (&self.clip.name, self.start, self.start + length);
+        format!("{clip}, frames {start} to {end} (N = {length})")
     }
 }
 

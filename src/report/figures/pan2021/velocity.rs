@@ -7,8 +7,8 @@ use crate::models::Generator;
 use crate::models::transition::effect::{Response, mean_rows, mean_velocity_factors};
 use crate::motion::{PART_NAMES, PARTS, measured_velocity_factors};
 use crate::report::chart::{Axis, Chart, Line};
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, ReportError, Shown};
 use crate::synthesis::{SequenceRequest, SynthesisOptions, synthesise};
 use ndarray::s;
 
@@ -20,7 +20,7 @@ const GAINS: [f64; 2] = [0.5, 1.5];
 const PART_GAINS: [f64; PARTS] = [1.0, 1.5, 1.0, 1.5, 1.0];
 
 /// Figure 4 (b): velocity factors along a generated motion, one that passes through its keyframes.
-pub fn figure_4b(stage: &Stage, model: &dyn Generator) -> Result<Figure, FiguresError> {
+pub fn figure_4b(stage: &Stage, model: &dyn Generator) -> Result<Figure, ReportError> {
     let request = &stage.shown().request;
     let sequence = synthesise(model, request, &SynthesisOptions::default(), model.name())?;
     let factors = measured_velocity_factors(sequence.features.view());
@@ -74,7 +74,7 @@ pub fn figure_8(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut rows = vec![row("factors × 1.0", &plain[0])];
     record_means(&mut numbers, "x 1.0", plain);
@@ -122,7 +122,7 @@ pub fn figure_9(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let faster = stage.generate(model, |request| request.velocity_times(PART_GAINS))?;
     let marked = PART_GAINS.map(|gain| gain != 1.0);
     let rows = vec![
