@@ -9,7 +9,8 @@ use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
-use crate::report::ReportError;
+use crate::report::figures::Numbers;
+use crate::report::{MotionRow, ReportError};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 /// Windows that a model predicts in one call.
@@ -120,6 +121,12 @@ impl<'d> Stage<'d> {
         }
     }
 
+    /// Notes how many windows the means are over.
+    pub fn count(&self, numbers: &mut Numbers) {
+        let windows = self.windows.len() as f64;
+        numbers.add("all windows", "windows", windows, "");
+    }
+
     /// A figure's title: what it is about, by which model, on which window.
     pub fn title(&self, what: &str, model: &str) -> String {
         format!("{what}: {model} on {}", self.shown().describe())
@@ -135,31 +142,24 @@ impl<'d> Stage<'d> {
         model: &dyn Generator,
         change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
     ) -> Result<Vec<Generated>, ReportError> {
-        let requests: Vec<SequenceRequest> = self
-            .windows
-            .iter()
-            .map(|window| change(window.request.clone()))
-            .collect::<Result<_, _>>()?;
-        let pieces: Vec<Request> = requests
-            .iter()
-            .map(|request| request.piece(&request.keyframes))
-            .collect();
+        let changed = self.windows.iter().map(|it| change(it.request.clone()));
+        let requests: Vec<SequenceRequest> = changed.collect::<Result<_, _>>()?;
+        let pieces = requests.iter().map(|it| it.piece(&it.keyframes));
         let predicted: Vec<Vec<Array2<f64>>> = pieces
+            .collect::<Vec<Request>>()
             .par_chunks(CHUNK)
             .map(|chunk| model.raw(chunk))
             .collect::<Result<_, ModelError>>()?;
         let predicted = predicted.into_iter().flatten();
-        let generated = requests
-            .into_iter()
-            .zip(predicted)
-            .map(|(request, predicted)| {
-                check_frames(predicted.view(), request.frames() - 1)?;
-                let mut frames = Array2::zeros((request.frames(), FRAME));
-                let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
-                frames.row_mut(0).assign(&first);
-                frames.slice_mut(s![1.., ..]).assign(&predicted);
-                Ok(Generated { request, frames })
-            });
+        let generated = requests.into_iter().zip(predicted);
+        let generated = generated.map(|(request, predicted)| {
+            check_frames(predicted.view(), request.frames() - 1)?;
+            let mut frames = Array2::zeros((request.frames(), FRAME));
+            let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
+            frames.row_mut(0).assign(&first);
+            frames.slice_mut(s![1.., ..]).assign(&predicted);
+            Ok(Generated { request, frames })
+        });
         generated.collect()
     }
 }
@@ -176,12 +176,17 @@ impl Window<'_> {
 impl Generated {
     /// World positions of the joints with the last frame as the keyframe that was given, `[N +
     /// 1][24]`, cm.
-    pub fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
+    fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
         let mut drawn = positions(self.frames.view());
         if let (Some(last), Some(target)) = (drawn.last_mut(), self.request.keyframes.last()) {
             *last = world_positions(target.keyframe.features.view());
         }
         drawn
+    }
+
+    /// A row of dancers from keyframe to keyframe.
+    pub fn row(&self, label: &str) -> MotionRow {
+        MotionRow::between_keyframes(label, self.drawn(), true)
     }
 
     /// Root positions that were asked for, cm.
