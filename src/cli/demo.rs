@@ -109,8 +109,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
 
     let clips = DanceClip::measure_all(&dataset.test, &config.data.features())?;
     let showcase = Showcase::new(&clips)?;
-    let files = demo::showcase_files(run.path());
-    let motion = showcase.write(&interpolation, &*model, &files)?;
+    let motion = showcase.write(&interpolation, &*model, run.path())?;
     writeln!(
         out,
         "{}: {showcase}; its rotations meet the predicted positions to {:.1} cm in the mean, {:.1} cm at most",

@@ -8,7 +8,7 @@ use super::rows::Row;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::scores::AVERAGE;
 use crate::evaluation::{EvaluatedData, EvaluationRecord, Scores};
-use crate::report::{LossSeries, ValidationSeries, loss_curve, thousands, validation_curve};
+use crate::report::{LossSeries, loss_curve, thousands, validation_curve};
 use crate::run::{FileError, LogLine, RunFolder, replace_file};
 
 const LOSS_CURVE: &str = "loss_curve.svg";
@@ -123,12 +123,11 @@ impl RowResults {
             return Ok(());
         };
         let columns = row.columns().filter(|column| *column != AVERAGE);
-        let series = columns.map(|column| ValidationSeries {
-            column: column.into(),
-            points: points(&|line| line.validation.as_ref()?.row(metric.key)?.at(column)),
-        });
+        let score =
+            |line: &LogLine, column: &str| line.validation.as_ref()?.row(metric.key)?.at(column);
+        let series = columns.map(|column| (column, points(&|line| score(line, column))));
         let title = title(&format!("{} on validation clips", metric.title));
-        let curve = validation_curve(&title, metric, &series.collect::<Vec<_>>())?;
+        let curve = validation_curve(&title, metric, series.collect())?;
         Ok(replace_file(&path.join(VALIDATION_CURVE), curve)?)
     }
 

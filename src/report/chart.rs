@@ -26,6 +26,7 @@ const COLOURS: [&str; 12] = [
 /// How numbers become places along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
+    /// From 0.
     Linear,
     /// Base 10. Numbers that are not positive have no place and are left out.
     Logarithmic,
@@ -37,12 +38,10 @@ pub struct Axis {
     /// What it shows, with the unit.
     pub label: String,
     pub scale: Scale,
-    /// Whether a linear axis starts at 0 rather than at the smallest number.
-    pub from_zero: bool,
 }
 
 /// One line of a chart.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Line {
     /// Its name in the legend.
     pub name: String,
@@ -54,6 +53,17 @@ pub struct Line {
     pub dots: bool,
     /// Which of the colours it takes: lines of one number share one.
     pub colour: usize,
+}
+
+impl Line {
+    /// A thin unbroken line without a name.
+    pub(super) fn plain(points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self {
+            points,
+            colour,
+            ..Self::default()
+        }
+    }
 }
 
 /// A chart of lines.
@@ -75,11 +85,8 @@ impl Chart {
     /// [`FigureError`]: a NaN or infinity, or no point that has a place on both axes.
     pub fn svg(&self) -> Result<String, FigureError> {
         for line in &self.lines {
-            if line
-                .points
-                .iter()
-                .any(|(x, y)| !(x.is_finite() && y.is_finite()))
-            {
+            let mut points = line.points.iter();
+            if !points.all(|(x, y)| x.is_finite() && y.is_finite()) {
                 return Err(FigureError::NotFinite {
                     figure: self.title.clone(),
                     series: line.name.clone(),
@@ -88,11 +95,8 @@ impl Chart {
         }
         let drawable = |&(x, y): &(f64, f64)| self.x.shows(x) && self.y.shows(y);
         let points = || {
-            self.lines
-                .iter()
-                .flat_map(|line| &line.points)
-                .copied()
-                .filter(drawable)
+            let points = self.lines.iter().flat_map(|line| &line.points);
+            points.copied().filter(drawable)
         };
         if points().next().is_none() {
             return Err(FigureError::Empty {
@@ -103,25 +107,15 @@ impl Chart {
         let across = Range::of(&self.x, points().map(|point| point.0), LEFT, RIGHT);
         let up = Range::of(&self.y, points().map(|point| point.1), BOTTOM, TOP);
 
-        let longest = self
-            .lines
-            .iter()
-            .map(|line| line.name.chars().count())
-            .max();
-        let legend = LEGEND + LETTER * longest.unwrap_or(0) as f64;
+        let names = self.lines.iter().map(|line| line.name.chars().count());
+        let legend = LEGEND + LETTER * names.max().unwrap_or(0) as f64;
         let mut svg = Svg::new(WIDTH.max(legend), HEIGHT, &self.title);
-        let mut heading = Font::new(17.0, INK, Anchor::Start);
-        heading.bold = true;
-        svg.text([LEFT, 32.0], &self.title, heading);
+        svg.text([LEFT, 32.0], &self.title, Font::bold(17.0, INK));
         draw_axes(&mut svg, self, &across, &up);
         for (index, line) in self.lines.iter().enumerate() {
-            let places: Vec<[f64; 2]> = line
-                .points
-                .iter()
-                .filter(|point| drawable(point))
-                .map(|&(x, y)| [across.place(x), up.place(y)])
-                .collect();
-            draw_line(&mut svg, line, &places, index);
+            let points = line.points.iter().filter(|point| drawable(point));
+            let places = points.map(|&(x, y)| [across.place(x), up.place(y)]);
+            draw_line(&mut svg, line, &places.collect::<Vec<_>>(), index);
         }
         svg.caption(&self.caption);
         Ok(svg.finish())
@@ -134,7 +128,6 @@ impl Axis {
         Self {
             label: label.into(),
             scale: Scale::Linear,
-            from_zero: true,
         }
     }
 
@@ -147,25 +140,17 @@ fn draw_axes(svg: &mut Svg, chart: &Chart, across: &Range, up: &Range) {
     for (tick, label) in up.ticks() {
         let y = up.place(tick);
         svg.line(&[[LEFT, y], [RIGHT, y]], Stroke::solid(FAINT, 1.0));
-        svg.text(
-            [LEFT - 8.0, y + 4.0],
-            &label,
-            Font::new(12.0, INK, Anchor::End),
-        );
+        let font = Font::new(12.0, INK, Anchor::End);
+        svg.text([LEFT - 8.0, y + 4.0], &label, font);
     }
     for (tick, label) in across.ticks() {
         let x = across.place(tick);
         svg.line(&[[x, BOTTOM], [x, BOTTOM + 5.0]], Stroke::solid(INK, 1.0));
-        svg.text(
-            [x, BOTTOM + 20.0],
-            &label,
-            Font::new(12.0, INK, Anchor::Middle),
-        );
+        let font = Font::new(12.0, INK, Anchor::Middle);
+        svg.text([x, BOTTOM + 20.0], &label, font);
     }
-    svg.line(
-        &[[LEFT, TOP], [LEFT, BOTTOM], [RIGHT, BOTTOM]],
-        Stroke::solid(INK, 1.2),
-    );
+    let corner = [[LEFT, TOP], [LEFT, BOTTOM], [RIGHT, BOTTOM]];
+    svg.line(&corner, Stroke::solid(INK, 1.2));
     let below = [(LEFT + RIGHT) / 2.0, BOTTOM + 44.0];
     svg.text(below, &chart.x.label, Font::new(13.0, INK, Anchor::Middle));
     let mut upright = Font::new(13.0, INK, Anchor::Middle);
@@ -205,12 +190,12 @@ struct Range {
 
 impl Range {
     fn of(axis: &Axis, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let measured = values.map(|value| measure(axis.scale, value));
-        let start = if axis.from_zero && axis.scale == Scale::Linear {
-            (0.0, 0.0)
-        } else {
-            (f64::INFINITY, f64::NEG_INFINITY)
+        let linear = axis.scale == Scale::Linear;
+        let start = match linear {
+            true => (0.0, 0.0),
+            false => (f64::INFINITY, f64::NEG_INFINITY),
         };
+        let measured = values.map(|value| measure(axis.scale, value));
         let (mut low, mut high) = measured.fold(start, |(low, high), value| {
             (low.min(value), high.max(value))
         });
@@ -219,10 +204,12 @@ impl Range {
             (low, high) = (low - room, high + room);
         }
         let margin = 0.04 * (high - low);
-        let at_zero = axis.from_zero && axis.scale == Scale::Linear && low == 0.0;
         Self {
             scale: axis.scale,
-            low: if at_zero { 0.0 } else { low - margin },
+            low: match linear && low == 0.0 {
+                true => 0.0,
+                false => low - margin,
+            },
             high: high + margin,
             from,
             to,
@@ -236,34 +223,29 @@ impl Range {
 
     /// Values to label within the span, and their labels.
     fn ticks(&self) -> Vec<(f64, String)> {
-        match self.scale {
+        let span = self.high - self.low;
+        let ticks: Vec<f64> = match self.scale {
             Scale::Linear => {
-                let step = round_step((self.high - self.low) / 8.0);
+                let step = round_step(span / 8.0);
                 let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
-                (first as i64..=last as i64)
-                    .map(|count| count as f64 * step)
-                    .map(|tick| (tick, number(tick)))
-                    .collect()
+                let counts = first as i64..=last as i64;
+                counts.map(|count| count as f64 * step).collect()
             }
             Scale::Logarithmic => {
                 let decades = self.low.floor() as i32..=self.high.ceil() as i32;
                 // Few decades need 1, 2 and 5 of each, many only the decade itself.
-                let mantissas: &[f64] = match self.high - self.low {
+                let mantissas: &[f64] = match span {
                     span if span < 1.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
                     span if span < 3.5 => &[1.0, 2.0, 5.0],
                     _ => &[1.0],
                 };
                 decades
-                    .flat_map(|decade| {
-                        mantissas
-                            .iter()
-                            .map(move |mantissa| mantissa * 10f64.powi(decade))
-                    })
+                    .flat_map(|decade| mantissas.iter().map(move |m| m * 10f64.powi(decade)))
                     .filter(|tick| (self.low..=self.high).contains(&tick.log10()))
-                    .map(|tick| (tick, number(tick)))
                     .collect()
             }
-        }
+        };
+        ticks.into_iter().map(|tick| (tick, number(tick))).collect()
     }
 }
 

@@ -1,8 +1,7 @@
 //! One dancer of a motion figure.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
-use super::camera::Camera;
 use super::svg::{Stroke, Svg};
 use crate::motion::{DANCE_PARENTS, JOINTS, PART_WEIGHTS, PARTS};
 
@@ -16,23 +15,17 @@ pub(super) struct Palette {
     pub outline: &'static str,
 }
 
-pub(super) const KEYFRAME: Palette = Palette {
-    fill: "#e03c31",
-    outline: "#7d1410",
-};
-pub(super) const GENERATED: Palette = Palette {
-    fill: "#ffc21a",
-    outline: "#8a5a00",
-};
-pub(super) const RECORDED: Palette = Palette {
-    fill: "#93acc6",
-    outline: "#3d5570",
-};
+impl Palette {
+    const fn of(fill: &'static str, outline: &'static str) -> Self {
+        Self { fill, outline }
+    }
+}
+
+pub(super) const KEYFRAME: Palette = Palette::of("#e03c31", "#7d1410");
+pub(super) const GENERATED: Palette = Palette::of("#ffc21a", "#8a5a00");
+pub(super) const RECORDED: Palette = Palette::of("#93acc6", "#3d5570");
 /// Parts of the body that were asked to move otherwise.
-pub(super) const MARKED: Palette = Palette {
-    fill: "#3f86e0",
-    outline: "#173f78",
-};
+pub(super) const MARKED: Palette = Palette::of("#3f86e0", "#173f78");
 
 /// One dancer as seen by the camera, in pixels from the place on the floor under the path.
 pub(super) struct Drawn {
@@ -46,13 +39,10 @@ pub(super) struct Drawn {
 impl Drawn {
     /// `frame`: world positions, cm; `path`: the place in the world that the dancer is drawn from.
     pub fn new(frame: &[DVec3; JOINTS], path: DVec3) -> Self {
-        let camera = Camera::three_quarter(SCALE);
-        let joints = frame.map(|joint| camera.project(joint - path));
+        let joints = frame.map(|joint| seen(joint - path));
         let reach = |measure: &dyn Fn([f64; 2]) -> f64| {
-            joints
-                .iter()
-                .map(|joint| measure(joint.0))
-                .fold(0.0, f64::max)
+            let measured = joints.iter().map(|joint| measure(joint.0));
+            measured.fold(0.0, f64::max)
         };
         Self {
             joints,
@@ -70,36 +60,38 @@ impl Drawn {
             let [x, y] = self.joints[joint].0;
             [origin[0] + x, origin[1] + y]
         };
-        let mut bones: Vec<(f64, usize, usize)> = DANCE_PARENTS
-            .iter()
-            .enumerate()
-            .filter_map(|(joint, parent)| parent.map(|parent| (joint, parent)))
-            .map(|(joint, parent)| {
-                let nearness = (self.joints[joint].1 + self.joints[parent].1) / 2.0;
-                (nearness, joint, parent)
-            })
-            .collect();
+        let bone = |(joint, parent): (usize, &Option<usize>)| {
+            let nearness = (self.joints[joint].1 + self.joints[(*parent)?].1) / 2.0;
+            Some((nearness, joint, (*parent)?))
+        };
+        let mut bones: Vec<(f64, usize, usize)> =
+            DANCE_PARENTS.iter().enumerate().filter_map(bone).collect();
         bones.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, joint, parent) in bones {
-            let palette = if marked[part_of(joint)] {
-                MARKED
-            } else {
-                palette
+            let palette = match marked[part_of(joint)] {
+                true => MARKED,
+                false => palette,
             };
             let ends = [at(parent), at(joint)];
             let width = bone_width(joint);
             svg.line(&ends, Stroke::solid(palette.outline, width + 1.8));
             svg.line(&ends, Stroke::solid(palette.fill, width));
             if joint == HEAD_JOINT {
-                svg.ellipse(
-                    at(joint),
-                    [HEAD, HEAD],
-                    palette.fill,
-                    Stroke::solid(palette.outline, 1.0),
-                );
+                let outline = Stroke::solid(palette.outline, 1.0);
+                svg.ellipse(at(joint), [HEAD, HEAD], palette.fill, outline);
             }
         }
     }
+}
+
+/// Where a place (cm) appears in a fixed three-quarter view without perspective, from the front, a
+/// little from the dancer's left and from above: pixels to the right and down from the origin, and
+/// its nearness to the camera (cm; larger is nearer).
+fn seen(place: DVec3) -> ([f64; 2], f64) {
+    let aside = DQuat::from_rotation_y(-30f64.to_radians());
+    let down = DQuat::from_rotation_x(10f64.to_radians());
+    let seen = (down * aside) * place;
+    ([SCALE * seen.x, -SCALE * seen.y], seen.z)
 }
 
 /// Index of the joint that the head is drawn at.

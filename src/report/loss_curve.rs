@@ -25,11 +25,8 @@ const POINTS: usize = 300;
 pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureError> {
     let lines = series.iter().enumerate().map(|(index, series)| Line {
         name: series.name.clone(),
-        points: thinned(&series.points),
         emphasised: index == 0,
-        dashed: false,
-        dots: false,
-        colour: index,
+        ..Line::plain(thinned(&series.points), index)
     });
     Chart {
         title: title.to_string(),
@@ -38,7 +35,6 @@ pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureEr
         y: Axis {
             label: "loss (standardised units, log scale)".into(),
             scale: Scale::Logarithmic,
-            from_zero: false,
         },
         lines: lines.collect(),
     }
@@ -50,11 +46,11 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points
         .chunks(points.len().div_ceil(POINTS).max(1))
         .map(|run| {
-            let count = run.len() as f64;
-            let (x, y) = run
-                .iter()
-                .fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
-            (x / count, y / count)
+            let mean = |of: fn(&(f64, f64)) -> f64| {
+                let sum: f64 = run.iter().map(of).sum();
+                sum / run.len() as f64
+            };
+            (mean(|point| point.0), mean(|point| point.1))
         })
         .collect()
 }

@@ -4,11 +4,11 @@
 //! A figure knows numbers and positions only, no model and no training; the figures of a paper in
 //! [`figures`] ask models for them.
 
-pub mod camera;
 pub mod chart;
 mod dancer;
 #[cfg(feature = "papers")]
 pub mod demo;
+mod error;
 #[cfg(feature = "papers")]
 pub mod figures;
 pub mod loss_curve;
@@ -22,6 +22,9 @@ mod thousands;
 pub mod validation_curve;
 pub mod viewer;
 
+pub use error::FigureError;
+#[cfg(feature = "papers")]
+pub use error::ReportError;
 pub use loss_curve::{LossSeries, loss_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};
@@ -29,31 +32,5 @@ pub use run_table::RunTable;
 pub use schedule_note::{NO_TRAINING, schedule_note};
 pub use score_figure::{ScoreSeries, score_curve, score_figure};
 pub use thousands::thousands;
-pub use validation_curve::{ValidationSeries, validation_curve};
+pub use validation_curve::validation_curve;
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
-
-/// Why a figure cannot be drawn.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FigureError {
-    #[error("the figure {figure:?} has nothing to draw: {what}")]
-    Empty { figure: String, what: &'static str },
-    #[error("the figure {figure:?}: {series} has a NaN or an infinity")]
-    NotFinite { figure: String, series: String },
-    #[error(
-        "the figure {figure:?}: {row} has {found} frames, the first row has {expected}; rows show the same frames"
-    )]
-    Frames {
-        figure: String,
-        row: String,
-        found: usize,
-        expected: usize,
-    },
-    #[error(
-        "{figure:?}: keyframe {frame} lies outside its {frames} frames, which are numbered from 0"
-    )]
-    Keyframe {
-        figure: String,
-        frame: usize,
-        frames: usize,
-    },
-}

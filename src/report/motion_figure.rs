@@ -149,11 +149,8 @@ impl MotionFigure {
         let axis = if shared { 0.0 } else { 18.0 };
         let step = layout.row_height + axis;
         let height = TOP + step * rows.len() as f64 + if shared { 34.0 } else { 16.0 };
-        let span = self
-            .rows
-            .iter()
-            .filter_map(|row| row.paths.as_ref().map(RootPaths::span))
-            .fold(0.0, f64::max);
+        let paths = self.rows.iter().filter_map(|row| row.paths.as_ref());
+        let span = paths.map(RootPaths::span).fold(0.0, f64::max);
 
         let mut svg = Svg::new(layout.width, height, &self.title);
         self.draw_heading(&mut svg);
@@ -161,10 +158,8 @@ impl MotionFigure {
             let ground = TOP + step * index as f64 + layout.above + 10.0;
             svg.begin_group("row");
             let floor = layout.panel.0 - GUTTER;
-            svg.line(
-                &[[LEFT, ground], [floor, ground]],
-                Stroke::solid("#b8b8b8", 1.2),
-            );
+            let line = [[LEFT, ground], [floor, ground]];
+            svg.line(&line, Stroke::solid("#b8b8b8", 1.2));
             draw_label(&mut svg, &placed.row.label, ground - layout.above / 2.0);
             placed.draw(&mut svg, &layout, ground);
             if let Some(paths) = &placed.row.paths {
@@ -185,11 +180,8 @@ impl MotionFigure {
 
     fn placed(&self) -> Vec<PlacedRow<'_>> {
         let first = &self.rows[0];
-        let floor = first
-            .frames
-            .iter()
-            .flatten()
-            .fold(f64::INFINITY, |lowest, joint| lowest.min(joint.y));
+        let heights = first.frames.iter().flatten().map(|joint| joint.y);
+        let floor = heights.fold(f64::INFINITY, f64::min);
         let placed = |row| {
             let path = match self.placing {
                 Placing::OnFirstPath => first,
@@ -227,9 +219,10 @@ impl MotionFigure {
                     expected: first.frames.len(),
                 });
             }
-            let finite = row.frames.iter().flatten().all(|joint| joint.is_finite())
-                && row.paths.iter().all(RootPaths::is_finite);
-            if !finite {
+            let mut joints = row.frames.iter().flatten();
+            if !(joints.all(|joint| joint.is_finite())
+                && row.paths.iter().all(RootPaths::is_finite))
+            {
                 return Err(FigureError::NotFinite {
                     figure: self.title.clone(),
                     series: row.label.clone(),
@@ -240,33 +233,24 @@ impl MotionFigure {
     }
 
     fn draw_heading(&self, svg: &mut Svg) {
-        let mut font = Font::new(17.0, INK, Anchor::Start);
-        font.bold = true;
-        svg.text([16.0, 28.0], &self.title, font);
+        svg.text([16.0, 28.0], &self.title, Font::bold(17.0, INK));
         let any = |what: fn(&MotionRow) -> bool| self.rows.iter().any(what);
+        let (given, marked) = (
+            any(|row| !row.keyframes.is_empty()),
+            any(|row| row.marked.contains(&true)),
+        );
         let entries = [
-            (
-                KEYFRAME,
-                "keyframe (given)",
-                any(|row| !row.keyframes.is_empty()),
-            ),
+            (KEYFRAME, "keyframe (given)", given),
             (RECORDED, "recorded", any(|row| !row.generated)),
             (GENERATED, "generated", any(|row| row.generated)),
-            (
-                MARKED,
-                "asked to move faster",
-                any(|row| row.marked.contains(&true)),
-            ),
+            (MARKED, "asked to move faster", marked),
         ];
+        let font = Font::new(12.5, INK, Anchor::Start);
         let mut x = 22.0;
         for (palette, name, _) in entries.iter().filter(|entry| entry.2) {
-            svg.ellipse(
-                [x, 49.0],
-                [6.0, 6.0],
-                palette.fill,
-                Stroke::solid(palette.outline, 1.2),
-            );
-            svg.text([x + 12.0, 53.0], name, Font::new(12.5, INK, Anchor::Start));
+            let outline = Stroke::solid(palette.outline, 1.2);
+            svg.ellipse([x, 49.0], [6.0, 6.0], palette.fill, outline);
+            svg.text([x + 12.0, 53.0], name, font);
             x += 40.0 + 7.0 * name.len() as f64;
         }
         if any(|row| row.paths.is_some()) {
@@ -280,7 +264,7 @@ impl MotionFigure {
                     dash,
                 };
                 svg.line(&[[x - 6.0, 49.0], [x + 14.0, 49.0]], stroke);
-                svg.text([x + 20.0, 53.0], name, Font::new(12.5, INK, Anchor::Start));
+                svg.text([x + 20.0, 53.0], name, font);
                 x += 48.0 + 7.0 * name.len() as f64;
             }
         }
@@ -301,11 +285,7 @@ impl Layout {
         let edge = (end + aside + 16.0).max(640.0);
         let with_panels = rows.iter().any(|row| row.row.paths.is_some());
         let panel = if with_panels { above.min(190.0) } else { 0.0 };
-        let width = if with_panels {
-            edge + panel + GUTTER
-        } else {
-            edge
-        };
+        let width = edge + if with_panels { panel + GUTTER } else { 0.0 };
         // The title's bold letters take less than 11 pixels each.
         let width = width.max(32.0 + 11.0 * title.chars().count() as f64);
         Self {
@@ -328,11 +308,7 @@ impl PlacedRow<'_> {
                 (false, true) => ("generated", GENERATED),
                 (false, false) => ("recorded", RECORDED),
             };
-            let marked = if given {
-                [false; PARTS]
-            } else {
-                self.row.marked
-            };
+            let marked = self.row.marked.map(|marked| marked && !given);
             let place = [layout.start + layout.spacing * column as f64, ground];
             svg.begin_group(class);
             dancer.draw(svg, place, palette, marked);
@@ -358,8 +334,7 @@ impl PlacedRow<'_> {
 /// A row's label, one line a word group of at most 14 characters.
 fn draw_label(svg: &mut Svg, label: &str, middle: f64) {
     let lines = wrapped(label, 14);
-    let mut font = Font::new(13.0, INK, Anchor::Start);
-    font.bold = true;
+    let font = Font::bold(13.0, INK);
     for (index, line) in lines.iter().enumerate() {
         let offset = index as f64 - (lines.len() as f64 - 1.0) / 2.0;
         svg.text([16.0, middle + 17.0 * offset], line, font);

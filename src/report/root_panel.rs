@@ -50,24 +50,26 @@ impl RootPaths {
     /// The larger side of what the panel must show, cm; panels of one figure share the largest.
     pub(super) fn span(&self) -> f64 {
         let (low, high) = self.corners();
-        let sides = match self.view {
-            PathView::Above => [high[0] - low[0], high[1] - low[1]],
-            PathView::Height => [0.0, high[1] - low[1]],
+        let width = match self.view {
+            PathView::Above => high[0] - low[0],
+            PathView::Height => 0.0,
         };
-        sides[0].max(sides[1]).max(LEAST_SPAN)
+        width.max(high[1] - low[1]).max(LEAST_SPAN)
     }
 
     fn corners(&self) -> ([f64; 2], [f64; 2]) {
-        let points = self.flat(&self.target).into_iter();
-        points.chain(self.flat(&self.generated)).fold(
-            ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
-            |(low, high), point| {
-                (
-                    [low[0].min(point[0]), low[1].min(point[1])],
-                    [high[0].max(point[0]), high[1].max(point[1])],
-                )
-            },
-        )
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for point in [&self.target, &self.generated]
+            .map(|path| self.flat(path))
+            .iter()
+            .flatten()
+        {
+            for axis in 0..2 {
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+            }
+        }
+        (low, high)
     }
 
     /// Draws the panel, a square of `size` pixels that `span` cm fill.
@@ -87,21 +89,20 @@ impl RootPaths {
         svg.begin_group("root");
         let [left, top] = corner;
         let (right, bottom) = (left + size, top + size);
-        let frame = [
-            [left, top],
-            [right, top],
-            [right, bottom],
-            [left, bottom],
-            [left, top],
+        let sides = [
+            (left, top),
+            (right, top),
+            (right, bottom),
+            (left, bottom),
+            (left, top),
         ];
-        svg.line(&frame, Stroke::solid(FRAME, 1.0));
+        svg.line(&sides.map(|(x, y)| [x, y]), Stroke::solid(FRAME, 1.0));
         let generated: Vec<_> = self.flat(&self.generated).into_iter().map(place).collect();
         svg.line(&generated, Stroke::solid(GENERATED, 1.8));
         let target = self.flat(&self.target);
-        let last = target.len().saturating_sub(1);
-        let kept = |&(frame, _): &(usize, [f64; 2])| frame.is_multiple_of(EVERY) || frame == last;
-        let target: Vec<_> = target.into_iter().enumerate().filter(kept).collect();
-        let target: Vec<_> = target.into_iter().map(|(_, point)| place(point)).collect();
+        let kept = |frame: &usize| frame.is_multiple_of(EVERY) || frame + 1 == target.len();
+        let kept = (0..target.len()).filter(kept);
+        let target: Vec<_> = kept.map(|frame| place(target[frame])).collect();
         let dashed = Stroke {
             colour: TARGET,
             width: 1.4,

@@ -35,11 +35,10 @@ pub fn score_curve(
             let paper = if dashed { ", paper" } else { "" };
             lines.push(Line {
                 name: format!("{}{paper}", model.name),
-                points: points.clone(),
                 emphasised: !dashed,
                 dashed,
                 dots: true,
-                colour,
+                ..Line::plain(points.clone(), colour)
             });
         }
     }
@@ -55,12 +54,8 @@ pub fn score_curve(
 
 /// What stands along an axis of this metric.
 pub(super) fn metric_axis(metric: &Metric) -> String {
-    format!(
-        "{} ({}), {}",
-        metric.title,
-        metric.unit,
-        metric.better.title()
-    )
+    let better = metric.better.title();
+    format!("{} ({}), {better}", metric.title, metric.unit)
 }
 
 /// The figure of the rows' scores on test clips, SVG: the mean over a model's seeds, and of the rows that the paper's file names
@@ -86,13 +81,8 @@ pub fn score_figure(
 fn series(metric: &Metric, printed: &PrintedTables, rows: &[TableRow]) -> Vec<ScoreSeries> {
     let of_paper = |row: &PrintedRow| -> Vec<(f64, f64)> {
         let values = row.values.get(metric.key).into_iter().flatten();
-        numbered(
-            printed
-                .columns
-                .iter()
-                .map(String::as_str)
-                .zip(values.copied()),
-        )
+        let columns = printed.columns.iter().map(String::as_str);
+        numbered(columns.zip(values.copied()))
     };
     let mut series: Vec<ScoreSeries> = Vec::new();
     for row in rows {

@@ -49,6 +49,14 @@ pub struct Font<'a> {
 }
 
 impl<'a> Font<'a> {
+    /// A bold text that starts at its position.
+    pub fn bold(size: f64, colour: &'a str) -> Self {
+        Self {
+            bold: true,
+            ..Self::new(size, colour, Anchor::Start)
+        }
+    }
+
     /// An upright text in the regular weight.
     pub fn new(size: f64, colour: &'a str, anchor: Anchor) -> Self {
         Self {

@@ -12,14 +12,3 @@ pub fn thousands(number: u64) -> String {
     }
     text
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thousands_are_parted_from_the_right() {
-        let texts = [0, 999, 1000, 123_456, 1_234_567].map(thousands);
-        assert_eq!(texts, ["0", "999", "1,000", "123,456", "1,234,567"]);
-    }
-}

@@ -5,16 +5,8 @@ use super::chart::{Axis, Chart, Line};
 use super::score_figure::metric_axis;
 use crate::evaluation::Metric;
 
-/// Scores in one column of a metric's table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ValidationSeries {
-    /// Such as a transition length N, frames.
-    pub column: String,
-    /// `(frame-steps, score)`, ascending in frame-steps.
-    pub points: Vec<(f64, f64)>,
-}
-
-/// Draws a metric on validation clips over frame-steps, a line for each column.
+/// Draws a metric on validation clips over frame-steps: for each column of its table, such as a
+/// length N in frames, a line through `(frame-steps, score)`, ascending in frame-steps.
 ///
 /// # Errors
 ///
@@ -22,15 +14,14 @@ pub struct ValidationSeries {
 pub fn validation_curve(
     title: &str,
     metric: &Metric,
-    columns: &[ValidationSeries],
+    columns: Vec<(&str, Vec<(f64, f64)>)>,
 ) -> Result<String, FigureError> {
-    let lines = columns.iter().enumerate().map(|(index, series)| Line {
-        name: format!("N = {}", series.column),
-        points: series.points.clone(),
+    let lines = columns.into_iter().enumerate();
+    let lines = lines.map(|(colour, (column, points))| Line {
+        name: format!("N = {column}"),
+        dots: points.len() <= 30,
         emphasised: true,
-        dashed: false,
-        dots: series.points.len() <= 30,
-        colour: index,
+        ..Line::plain(points, colour)
     });
     Chart {
         title: title.to_string(),

@@ -5,7 +5,9 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use keydance::evaluation::{ScoreRow, Scores};
 use keydance::motion::bvh;
+use keydance::report::demo::Comparison;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
@@ -99,4 +101,25 @@ fn another_run_is_not_overwritten_and_a_wrong_fraction_is_named() {
         .failure()
         .stderr(contains("--fraction").and(contains("1.5")));
     assert!(!folder.path().join("new").exists());
+}
+
+fn scores(lrp: [f64; 2]) -> Scores {
+    let row = ScoreRow::new([100, 150].into_iter().zip(lrp));
+    Scores::new([("lrp", row)], [100, 150].map(|length| (length, 1)))
+}
+
+#[test]
+fn ahead_is_ahead_at_every_long_transition() {
+    let ahead = |model: [f64; 2]| {
+        Comparison {
+            interpolation: scores([70.0, 80.0]),
+            untrained: scores([75.0, 78.0]),
+            model: scores(model),
+        }
+        .is_ahead()
+    };
+    assert!(ahead([69.9, 77.9]));
+    assert!(!ahead([69.9, 78.0]));
+    assert!(!ahead([70.1, 10.0]));
+    assert!(!ahead([f64::NAN, 10.0]));
 }

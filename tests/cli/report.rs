@@ -6,7 +6,7 @@ use keydance::evaluation::equations::Equations;
 use keydance::motion::{DANCE_PARENTS, JOINTS};
 use keydance::report::{
     FigureError, LossSeries, MotionFigure, MotionRow, PathView, Placing, RootPaths, ScoreSeries,
-    Shown, loss_curve, score_curve,
+    Shown, loss_curve, score_curve, thousands,
 };
 use roxmltree::{Document, Node};
 
@@ -381,4 +381,10 @@ fn the_curve_of_a_metric_has_the_papers_values_dashed_in_the_colour_of_ours() {
         [strokes[0].1, strokes[1].1, strokes[2].1],
         [false, true, false]
     );
+}
+
+#[test]
+fn thousands_are_parted_from_the_right() {
+    let texts = [0, 999, 1000, 123_456, 1_234_567].map(thousands);
+    assert_eq!(texts, ["0", "999", "1,000", "123,456", "1,234,567"]);
 }

@@ -3,6 +3,8 @@
 
 use std::fs;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
@@ -11,9 +13,11 @@ use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::TransitionModel;
 use keydance::models::transition::window_features;
 use keydance::models::transition::{DanceClip, TransitionRequest};
+use keydance::motion::JOINTS;
 use keydance::motion::placement::world_positions;
 use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use ndarray::{Axis, concatenate, s};
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::browser;
@@ -177,4 +181,52 @@ fn the_page_plays_in_a_browser_without_an_error() {
         failed.attribute("data-error").is_some(),
         "an error goes unnoticed"
     );
+}
+
+/// What `data.js` does.
+fn decoded(steps: &Value) -> Vec<f64> {
+    let bytes = STANDARD.decode(steps["steps"].as_str().unwrap()).unwrap();
+    let (step, origin) = (steps["step"].as_f64().unwrap(), &steps["origin"]);
+    let pairs = bytes.chunks_exact(2).enumerate();
+    pairs
+        .map(|(index, pair)| {
+            let steps = i16::from_le_bytes([pair[0], pair[1]]);
+            origin[index % 3].as_f64().unwrap() + step * f64::from(steps)
+        })
+        .collect()
+}
+
+#[test]
+fn positions_come_back_to_half_a_step_however_wide_the_motion() {
+    for width in [0.0, 40.0, 900.0, 90_000.0] {
+        let place = |number: usize| {
+            let share = number as f64 / 479.0;
+            let depth = -width * share * share;
+            DVec3::new(width * share - 7.0, 90.0 - 0.3 * share, depth)
+        };
+        let body = |time: usize| std::array::from_fn(|joint| place(time * JOINTS + joint));
+        let frames: Vec<[DVec3; JOINTS]> = (0..20).map(body).collect();
+        let viewer = Viewer {
+            title: "wide".into(),
+            frame_time: 1.0 / 30.0,
+            motions: vec![ViewerMotion {
+                name: "Model".into(),
+                kind: MotionKind::Model,
+                contacts: vec![[false; 4]; frames.len()],
+                velocity_factors: vec![[0.0; 5]; frames.len()],
+                positions: frames.clone(),
+            }],
+            keyframes: Vec::new(),
+            asked: None,
+        };
+        let data = page_data(&viewer.html().unwrap());
+        let positions = &data["motions"][0]["positions"];
+        let step = positions["step"].as_f64().unwrap();
+        assert!(step <= (width / 65_000.0).max(1.0 / 64.0));
+        let places = frames.iter().flatten().flat_map(DVec3::to_array);
+        for (expected, found) in places.zip(decoded(positions)) {
+            let apart = (expected - found).abs();
+            assert!(apart <= 0.51 * step, "{expected} {found}");
+        }
+    }
 }

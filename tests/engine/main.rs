@@ -1,4 +1,4 @@
-//! The autograd engine, motions and data sets.
+//! The autograd engine, motions, data sets, and what a training goes on with.
 
 // What several of these tests need.
 #[path = "../common/martial_data.rs"]
@@ -22,5 +22,7 @@ mod learning_rate;
 mod mapping;
 mod resample;
 mod rotation_fit;
+mod run_state;
 mod split;
+mod streams;
 mod velocity_factor;

@@ -30,31 +30,19 @@ impl Comparison {
 
     /// The rows of the three in the tables, the model trained as config and manifest say.
     pub fn rows(&self, config: &ExperimentConfig, manifest: &Manifest) -> [TableRow; 3] {
-        let row = |name: &str, seed, scores: &Scores, schedule_note: &str| TableRow {
-            name: name.into(),
+        let row = |name: &str, seed, scores: &Scores, note: &str| TableRow {
+            name: format!("{name}, generated clips"),
             seed,
             scores: Some(scores.clone()),
-            schedule_note: schedule_note.into(),
+            schedule_note: note.into(),
         };
+        let before = "the small whole model before its training";
+        let trained = schedule_note(config, manifest);
+        let seed = Some(manifest.seed);
         [
-            row(
-                "interpolation, generated clips",
-                None,
-                &self.interpolation,
-                NO_TRAINING,
-            ),
-            row(
-                "linear estimate, generated clips",
-                None,
-                &self.untrained,
-                "the small whole model before its training",
-            ),
-            row(
-                "small whole model, generated clips",
-                Some(manifest.seed),
-                &self.model,
-                &schedule_note(config, manifest),
-            ),
+            row("interpolation", None, &self.interpolation, NO_TRAINING),
+            row("linear estimate", None, &self.untrained, before),
+            row("small whole model", seed, &self.model, &trained),
         ]
     }
 
@@ -62,10 +50,8 @@ impl Comparison {
     fn long(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         LONG.into_iter().map(|length| {
             let lrp = |scores: &Scores| {
-                scores
-                    .row("lrp")
-                    .and_then(|row| row.at(length))
-                    .unwrap_or(f64::NAN)
+                let lrp = scores.row("lrp").and_then(|row| row.at(length));
+                lrp.unwrap_or(f64::NAN)
             };
             let scores = [&self.model, &self.untrained, &self.interpolation].map(lrp);
             (length, scores)
@@ -84,32 +70,5 @@ impl fmt::Display for Comparison {
             )?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::evaluation::ScoreRow;
-
-    fn scores(lrp: [f64; 2]) -> Scores {
-        let row = ScoreRow::new(LONG.into_iter().zip(lrp));
-        Scores::new([("lrp", row)], LONG.map(|length| (length, 1)))
-    }
-
-    #[test]
-    fn ahead_is_ahead_at_every_long_transition() {
-        let ahead = |model: [f64; 2]| {
-            Comparison {
-                interpolation: scores([70.0, 80.0]),
-                untrained: scores([75.0, 78.0]),
-                model: scores(model),
-            }
-            .is_ahead()
-        };
-        assert!(ahead([69.9, 77.9]));
-        assert!(!ahead([69.9, 78.0]));
-        assert!(!ahead([70.1, 10.0]));
-        assert!(!ahead([f64::NAN, 10.0]));
     }
 }

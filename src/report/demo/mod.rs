@@ -7,44 +7,15 @@ mod showcase;
 
 pub use comparison::Comparison;
 pub use losses::Losses;
-pub use settings::{DemoSettings, DemoSettingsError};
-pub use showcase::{Showcase, ShowcaseFiles};
+pub use settings::DemoSettings;
+pub use showcase::Showcase;
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::FigureError;
-use crate::data::{DataPart, Dataset, EmptyPart};
+use super::ReportError;
+use crate::data::{DataPart, Dataset};
 use crate::evaluation::{EvaluatedData, EvaluationRecord, PrintedTables, TableRow, Tables};
-use crate::models::ModelError;
-use crate::motion::bvh::BvhError;
-use crate::motion::fit::RotationFitError;
-use crate::run::{FileError, replace_file, write_json};
-
-/// Why a demo has no results.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    #[error("no test clip has the frames of a transition of {length}")]
-    TooShort { length: usize },
-    #[error("{clip} has fewer poses than frames")]
-    Poses { clip: String },
-    #[error("{model} gave no transition")]
-    NoTransition { model: String },
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error(transparent)]
-    Rotations(#[from] RotationFitError),
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    #[error(transparent)]
-    Bvh(#[from] BvhError),
-    #[error(transparent)]
-    EmptyPart(#[from] EmptyPart),
-    #[error(transparent)]
-    Toml(#[from] toml::ser::Error),
-    #[error(transparent)]
-    File(#[from] FileError),
-}
+use crate::run::{FileError, remove_file, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const LOSS_CURVE: &str = "loss_curve.svg";
@@ -72,26 +43,18 @@ pub fn remove_results(folder: &Path) -> Result<(), FileError> {
         UNTRAINED,
         CHOREOGRAPHY,
     ];
-    let names = own
-        .into_iter()
-        .chain(EvaluationRecord::files(DataPart::Test));
-    for path in names.map(|name| folder.join(name)) {
-        if path.exists() {
-            fs::remove_file(&path).map_err(FileError::at(&path, "removed"))?;
-        }
-    }
-    Ok(())
+    let scores = EvaluationRecord::files(DataPart::Test);
+    own.iter()
+        .chain(&scores)
+        .try_for_each(|name| remove_file(&folder.join(name)))
 }
 
 /// Writes the loss curve.
 ///
 /// # Errors
 /// There is no loss to draw, or the file cannot be written.
-pub fn write_losses(folder: &Path, losses: &Losses) -> Result<(), DemoError> {
-    Ok(replace_file(
-        &folder.join(LOSS_CURVE),
-        losses.figure()?.as_bytes(),
-    )?)
+pub fn write_losses(folder: &Path, losses: &Losses) -> Result<(), ReportError> {
+    Ok(replace_file(&folder.join(LOSS_CURVE), losses.figure()?)?)
 }
 
 /// Writes tables, the scores of all three, and what was generated.
@@ -105,14 +68,20 @@ pub fn write_scores(
     comparison: &Comparison,
     printed: &PrintedTables,
     rows: &[TableRow],
-) -> Result<(), DemoError> {
+) -> Result<(), ReportError> {
     let protocol = settings.experiment.protocol();
-    let tables = Tables {
-        metrics: protocol.metrics(),
-        printed,
-    };
-    let text = tables.markdown(rows, &caption(settings, dataset));
-    replace_file(&folder.join(TABLES), text.as_bytes())?;
+    let metrics = protocol.metrics();
+    let choreography = &settings.choreography;
+    let subject = format!(
+        "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not \
+         comparable",
+        dataset.test.len(),
+        choreography.clips,
+        choreography.frames_per_clip,
+        choreography.seed
+    );
+    let text = Tables { metrics, printed }.markdown(rows, &subject);
+    replace_file(&folder.join(TABLES), text)?;
     write_json(&folder.join(INTERPOLATION), &comparison.interpolation)?;
     write_json(&folder.join(UNTRAINED), &comparison.untrained)?;
     EvaluationRecord {
@@ -120,31 +89,6 @@ pub fn write_scores(
         data: EvaluatedData::of(dataset, DataPart::Test)?,
     }
     .write(folder)?;
-    let choreography = toml::to_string(&settings.choreography)?;
-    Ok(replace_file(
-        &folder.join(CHOREOGRAPHY),
-        choreography.as_bytes(),
-    )?)
-}
-
-/// What the scores were measured on.
-fn caption(settings: &DemoSettings, dataset: &Dataset) -> String {
-    let choreography = &settings.choreography;
-    format!(
-        "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not comparable",
-        dataset.test.len(),
-        choreography.clips,
-        choreography.frames_per_clip,
-        choreography.seed
-    )
-}
-
-/// Where the showcase of a demo goes.
-pub fn showcase_files(folder: &Path) -> ShowcaseFiles {
-    let path = |name: &str| -> PathBuf { folder.join(name) };
-    ShowcaseFiles {
-        figure: path(FIGURE),
-        viewer: path(VIEWER),
-        bvh: path(TRANSITION),
-    }
+    let choreography = toml::to_string(choreography)?;
+    Ok(replace_file(&folder.join(CHOREOGRAPHY), choreography)?)
 }

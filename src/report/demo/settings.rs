@@ -1,25 +1,12 @@
 //! What the demo generates and trains.
 
-use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
-use crate::data::{DataError, Dataset};
-use crate::experiment::{ConfigError, ExperimentConfig};
-use crate::models::settings::ValueError;
+use crate::data::Dataset;
+use crate::data::choreography::{ChoreographyConfig, generate};
+use crate::experiment::ExperimentConfig;
 use crate::models::transition::TransitionSettings;
+use crate::report::ReportError;
 
 const EXPERIMENT: &str = include_str!("../../../experiments/demo.toml");
-
-/// Why there is nothing to generate or to train.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoSettingsError {
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    #[error("--fraction is not a share of the schedule")]
-    Fraction(#[source] ValueError),
-    #[error(transparent)]
-    Choreography(#[from] ChoreographyError),
-    #[error(transparent)]
-    Data(#[from] DataError),
-}
 
 /// Clips and training of a demo.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +21,7 @@ impl DemoSettings {
     ///
     /// # Errors
     /// The fraction is not a share.
-    pub fn new(reduced: bool, fraction: Option<f64>) -> Result<Self, DemoSettingsError> {
+    pub fn new(reduced: bool, fraction: Option<f64>) -> Result<Self, ReportError> {
         let mut experiment = ExperimentConfig::parse(EXPERIMENT, "experiments/demo.toml")?;
         // 24 clips of half a minute: four of each style.
         let mut choreography = ChoreographyConfig {
@@ -48,7 +35,7 @@ impl DemoSettings {
         }
         if let Some(fraction) = fraction {
             set_fraction(&mut experiment, fraction);
-            experiment.validate().map_err(DemoSettingsError::Fraction)?;
+            experiment.validate().map_err(ReportError::Fraction)?;
         }
         Ok(Self {
             choreography,
@@ -60,7 +47,7 @@ impl DemoSettings {
     ///
     /// # Errors
     /// The clips cannot be generated or measured.
-    pub fn dataset(&self) -> Result<Dataset, DemoSettingsError> {
+    pub fn dataset(&self) -> Result<Dataset, ReportError> {
         let clips = generate(&self.choreography)?;
         let clips = clips.into_iter().map(|generated| generated.clip).collect();
         Ok(Dataset::from_clips(clips, &self.experiment.data)?)

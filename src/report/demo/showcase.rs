@@ -2,21 +2,19 @@
 //! as a figure and in the viewer.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::Path;
 
 use ndarray::{Array2, s};
 
-use super::DemoError;
+use super::{FIGURE, TRANSITION, VIEWER};
 use crate::evaluation::equations::window_request;
-use crate::models::transition::DanceClip;
-use crate::models::transition::window_features;
-use crate::models::transition::{Transition, TransitionRequest};
+use crate::models::transition::{DanceClip, Transition, TransitionRequest, window_features};
 use crate::models::{Generator, Request};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
 use crate::report::{
-    Asked, FigureError, MotionFigure, MotionKind, MotionRow, Placing, Shown, Viewer,
+    Asked, FigureError, MotionFigure, MotionKind, MotionRow, Placing, ReportError, Shown, Viewer,
     ViewerKeyframe, ViewerMotion,
 };
 use crate::run::replace_file;
@@ -39,17 +37,18 @@ pub struct Showcase<'d> {
 impl<'d> Showcase<'d> {
     /// # Errors
     /// No clip is long enough.
-    pub fn new(clips: &'d [DanceClip]) -> Result<Self, DemoError> {
-        let clip = clips
-            .iter()
-            .find(|clip| clip.frames() > LENGTH)
-            .ok_or(DemoError::TooShort { length: LENGTH })?;
+    pub fn new(clips: &'d [DanceClip]) -> Result<Self, ReportError> {
+        let clip = clips.iter().find(|clip| clip.frames() > LENGTH);
+        let clip = clip.ok_or_else(|| {
+            let problem = "no test clip has the frames of a transition of";
+            ReportError::Refused(format!("{problem} {LENGTH}"))
+        })?;
         let start = (clip.frames() - LENGTH - 1) / 2;
         let recorded = window_features(&clip.features, start, LENGTH);
-        let request =
-            window_request(&clip.clip, start, recorded.view()).ok_or_else(|| DemoError::Poses {
-                clip: clip.name.clone(),
-            })?;
+        let request = window_request(&clip.clip, start, recorded.view());
+        let request = request.ok_or_else(|| {
+            ReportError::Refused(format!("{} has fewer poses than frames", clip.name))
+        })?;
         Ok(Self {
             clip,
             start,
@@ -58,7 +57,7 @@ impl<'d> Showcase<'d> {
         })
     }
 
-    /// Writes the model's transition as BVH, the figure and the viewer's page.
+    /// Writes the model's transition as BVH, the figure and the viewer's page into a folder.
     ///
     /// # Errors
     /// A model fails, or a file cannot be written.
@@ -66,37 +65,35 @@ impl<'d> Showcase<'d> {
         &self,
         interpolation: &dyn Generator,
         model: &dyn Generator,
-        files: &ShowcaseFiles,
-    ) -> Result<SynthesisedMotion, DemoError> {
+        folder: &Path,
+    ) -> Result<SynthesisedMotion, ReportError> {
         let predicted = self.predict(model)?;
+        let interpolated = self.shown(&self.predict(interpolation)?);
         let motions = [
             ("Ground truth", MotionKind::Recorded, self.recorded.clone()),
-            (
-                "Interpolation",
-                MotionKind::Other,
-                self.shown(&self.predict(interpolation)?),
-            ),
+            ("Interpolation", MotionKind::Other, interpolated),
             (
                 "Small whole model",
                 MotionKind::Model,
                 self.shown(&predicted),
             ),
         ];
-        replace_file(&files.figure, self.figure(&motions)?.as_bytes())?;
-        replace_file(&files.viewer, self.viewer(&motions)?.as_bytes())?;
-        let name = files.bvh.display().to_string();
+        replace_file(&folder.join(FIGURE), self.figure(&motions)?)?;
+        replace_file(&folder.join(VIEWER), self.viewer(&motions)?)?;
+        let file = folder.join(TRANSITION);
+        let name = file.display().to_string();
         let request = TransitionRequest::of(&self.request)?;
         let motion = transition_motion(&request, &predicted, &name, self.clip.clip.frame_time)?;
         let channels = channel_layout(&motion.clip, [Axis::Z, Axis::X, Axis::Y]);
-        bvh::write(&files.bvh, &Bvh::from_clip(&motion.clip, channels)?)?;
+        bvh::write(&file, &Bvh::from_clip(&motion.clip, channels)?)?;
         Ok(motion)
     }
 
-    fn predict(&self, model: &dyn Generator) -> Result<Transition, DemoError> {
+    fn predict(&self, model: &dyn Generator) -> Result<Transition, ReportError> {
         let mut predicted = model.raw(std::slice::from_ref(&self.request))?;
-        let frames = predicted.pop().ok_or_else(|| DemoError::NoTransition {
-            model: model.name().into(),
-        })?;
+        let frames = predicted
+            .pop()
+            .ok_or_else(|| ReportError::Refused(format!("{} gave no transition", model.name())))?;
         Ok(Transition { frames })
     }
 
@@ -114,14 +111,14 @@ impl<'d> Showcase<'d> {
             let frames = frames.rows().into_iter().map(world_positions).collect();
             MotionRow::between_keyframes(*label, frames, *kind != MotionKind::Recorded)
         });
-        let figure = MotionFigure {
-            title: format!("{self}"),
+        MotionFigure {
+            title: self.to_string(),
             caption: String::new(),
             rows: rows.collect(),
             shown: Shown::Every(EVERY),
             placing: Placing::OnFirstPath,
-        };
-        figure.svg()
+        }
+        .svg()
     }
 
     /// The motions in the viewer.
@@ -133,40 +130,25 @@ impl<'d> Showcase<'d> {
             frame,
             positions: world_positions(self.recorded.row(frame)),
         });
-        let viewer = Viewer {
-            title: format!("{self}"),
+        let (root, factors) = (&self.request.root, &self.request.velocity_factors);
+        let asked = root.as_ref().zip(factors.as_ref());
+        Viewer {
+            title: self.to_string(),
             frame_time: self.clip.clip.frame_time,
             motions: motions.collect(),
             keyframes: keyframes.to_vec(),
-            asked: self
-                .request
-                .root
-                .as_ref()
-                .zip(self.request.velocity_factors.as_ref())
-                .map(|(root, factors)| Asked::new(root.view(), factors.view())),
-        };
-        viewer.html()
+            asked: asked.map(|(root, factors)| Asked::new(root.view(), factors.view())),
+        }
+        .html()
     }
 }
 
 /// What a motion is called, where it comes from, its frames `[N + 1, 149 or 154]`.
 type Named = (&'static str, MotionKind, Array2<f64>);
 
-/// Where the showcase goes.
-pub struct ShowcaseFiles {
-    pub figure: PathBuf,
-    pub viewer: PathBuf,
-    pub bvh: PathBuf,
-}
-
 impl fmt::Display for Showcase<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}, frames {} to {} (N = {LENGTH})",
-            self.clip.name,
-            self.start,
-            self.start + LENGTH
-        )
+        let (clip, start, end) = (&self.clip.name, self.start, self.start + LENGTH);
+        write!(f, "{clip}, frames {start} to {end} (N = {LENGTH})")
     }
 }

@@ -1,16 +1,14 @@
 //! The figures of papers: each an SVG with a caption, its numbers as CSV beside it. One file or
 //! folder a paper.
 
-mod error;
 mod numbers;
 pub mod pan2021;
 
-pub use error::FiguresError;
 pub use numbers::Numbers;
 
 use std::path::Path;
 
-use super::MotionFigure;
+use super::{MotionFigure, ReportError};
 use crate::run::replace_file;
 
 /// A figure and the numbers behind it.
@@ -32,7 +30,7 @@ impl Figure {
         name: &'static str,
         drawing: MotionFigure,
         numbers: Numbers,
-    ) -> Result<Self, FiguresError> {
+    ) -> Result<Self, ReportError> {
         Ok(Self {
             name,
             svg: drawing.svg()?,
@@ -45,9 +43,9 @@ impl Figure {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), FiguresError> {
+    pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
         let path = |extension: &str| folder.join(self.name).with_extension(extension);
-        replace_file(&path("svg"), self.svg.as_bytes())?;
+        replace_file(&path("svg"), &self.svg)?;
         replace_file(&path("csv"), &self.numbers.csv()?)?;
         Ok(())
     }

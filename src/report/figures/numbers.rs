@@ -8,7 +8,7 @@ use crate::motion::{PART_NAMES, PARTS};
 #[derive(Debug, Clone, Serialize)]
 struct Number {
     row: String,
-    measure: &'static str,
+    measure: String,
     /// Body part; empty for a number of the whole body.
     part: &'static str,
     /// Empty for a number of the whole motion.
@@ -30,41 +30,36 @@ pub struct Numbers {
 
 impl Numbers {
     /// One number of a row.
-    pub fn add(&mut self, row: &str, measure: &'static str, value: f64, unit: &'static str) {
-        self.push(row, measure, "", None, value, unit);
+    pub fn add(&mut self, row: &str, measure: impl Into<String>, value: f64, unit: &'static str) {
+        self.push(row, measure.into(), ("", None), value, unit);
     }
 
     /// One number a body part.
     pub fn add_parts(
         &mut self,
         row: &str,
-        measure: &'static str,
+        measure: impl Into<String>,
         values: [f64; PARTS],
         unit: &'static str,
     ) {
-        for (part, value) in values.into_iter().enumerate() {
-            self.add_part(row, measure, part, value, unit);
+        let measure = measure.into();
+        for (part, value) in PART_NAMES.into_iter().zip(values) {
+            self.push(row, measure.clone(), (part, None), value, unit);
         }
     }
 
     /// One number of one body part.
-    pub fn add_part(
-        &mut self,
-        row: &str,
-        measure: &'static str,
-        part: usize,
-        value: f64,
-        unit: &'static str,
-    ) {
-        self.push(row, measure, PART_NAMES[part], None, value, unit);
+    pub fn add_part(&mut self, row: &str, measure: &str, part: usize, value: f64) {
+        let place = (PART_NAMES[part], None);
+        self.push(row, measure.into(), place, value, "");
     }
 
     /// Velocity factors of a generated motion, frame by frame.
     pub fn add_factor_series(&mut self, row: &str, factors: &[[f64; PARTS]]) {
         for (frame, factors) in factors.iter().enumerate().skip(1) {
             for (part, &value) in PART_NAMES.into_iter().zip(factors) {
-                let measure = "velocity_factor";
-                self.push(row, measure, part, Some(frame), value, "cm/frame");
+                let measure = "velocity_factor".into();
+                self.push(row, measure, (part, Some(frame)), value, "cm/frame");
             }
         }
     }
@@ -72,9 +67,8 @@ impl Numbers {
     fn push(
         &mut self,
         row: &str,
-        measure: &'static str,
-        part: &'static str,
-        frame: Option<usize>,
+        measure: String,
+        (part, frame): (&'static str, Option<usize>),
         value: f64,
         unit: &'static str,
     ) {

@@ -1,26 +1,39 @@
-//! The page of a generated sequence: beside interpolation and, where there is one, the recorded
-//! motion.
+//! Pages of motions that were made from a request.
 
-use super::{MotionKind, RequestMotion, Viewer};
+use ndarray::ArrayView2;
+
+use super::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
 use crate::models::ModelKind as _;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::Kind;
-use crate::report::FigureError;
+use crate::motion::placement::world_positions;
+use crate::report::ReportError;
 use crate::run::Subject;
 use crate::synthesis::keyframes::Keyframes;
-use crate::synthesis::{Sequence, SequenceRequest, SynthesisError, SynthesisOptions, synthesise};
+use crate::synthesis::{Sequence, SequenceRequest, SynthesisOptions, synthesise};
 
-/// Why there is no page.
-#[derive(Debug, thiserror::Error)]
-pub enum PageError {
-    #[error(transparent)]
-    Synthesis(#[from] SynthesisError),
-    #[error(transparent)]
-    Figure(#[from] FigureError),
+impl Viewer {
+    /// Motions with the keyframes and the controls of the request that they were made from.
+    pub fn of_request(title: &str, request: &SequenceRequest, motions: Vec<ViewerMotion>) -> Self {
+        let keyframes = request.keyframes.iter().map(|timed| ViewerKeyframe {
+            frame: timed.time,
+            positions: world_positions(timed.keyframe.features.view()),
+        });
+        Self {
+            title: title.into(),
+            frame_time: request.frame_time,
+            motions,
+            keyframes: keyframes.collect(),
+            asked: Some(Asked::new(
+                request.root_trajectory.view(),
+                request.velocity_factors.view(),
+            )),
+        }
+    }
 }
 
-/// The page of what a subject made of a request with keyframes, HTML; interpolation is asked under
-/// the same options.
+/// The page of what a subject made of a request with keyframes, HTML: beside the recorded motion,
+/// where there is one, and interpolation, which is asked under the same options.
 ///
 /// # Errors
 /// Interpolation cannot be asked, or the page has nothing to show.
@@ -30,34 +43,25 @@ pub fn generated_page(
     request: &SequenceRequest,
     sequence: &Sequence,
     options: &SynthesisOptions,
-) -> Result<String, PageError> {
-    let interpolation = Interpolation {
-        contact_threshold: subject.config.data.contact_threshold,
-    };
-    let name = "Interpolation";
-    let interpolated = match subject.config.model.kind() == Kind::Interpolation.name() {
-        false => Some(synthesise(&interpolation, request, options, name)?),
-        true => None,
+) -> Result<String, ReportError> {
+    let config = &subject.config;
+    let motion = |name: &str, kind, frames: ArrayView2<'_, f64>| {
+        ViewerMotion::from_features(name, kind, frames)
     };
     let mut shown = Vec::new();
     if let Some(frames) = keyframes.recorded(request) {
-        shown.push(RequestMotion {
-            name: "Ground truth",
-            kind: MotionKind::Recorded,
-            frames,
-        });
+        shown.push(motion("Ground truth", MotionKind::Recorded, frames));
     }
-    if let Some(interpolated) = &interpolated {
-        shown.push(RequestMotion {
-            name,
-            kind: MotionKind::Other,
-            frames: interpolated.features.view(),
-        });
+    if config.model.kind() != Kind::Interpolation.name() {
+        let interpolation = Interpolation {
+            contact_threshold: config.data.contact_threshold,
+        };
+        let name = "Interpolation";
+        let interpolated = synthesise(&interpolation, request, options, name)?;
+        let frames = interpolated.features.view();
+        shown.push(motion(name, MotionKind::Other, frames));
     }
-    shown.push(RequestMotion {
-        name: &subject.config.name,
-        kind: MotionKind::Model,
-        frames: sequence.features.view(),
-    });
-    Ok(Viewer::of_request(&sequence.clip.name, request, &shown).html()?)
+    let frames = sequence.features.view();
+    shown.push(motion(&config.name, MotionKind::Model, frames));
+    Ok(Viewer::of_request(&sequence.clip.name, request, shown).html()?)
 }

@@ -5,8 +5,6 @@
 
 #[cfg(feature = "papers")]
 mod generated;
-#[cfg(feature = "papers")]
-mod of_request;
 mod page;
 mod positions;
 
@@ -22,9 +20,7 @@ use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
 
 #[cfg(feature = "papers")]
-pub use generated::{PageError, generated_page};
-#[cfg(feature = "papers")]
-pub use of_request::RequestMotion;
+pub use generated::generated_page;
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;
@@ -46,7 +42,7 @@ pub struct Viewer {
 }
 
 /// What a model was asked for beside the keyframes, one row a frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Asked {
     /// Root positions, cm.
     pub root_trajectory: Vec<DVec3>,
@@ -123,11 +119,9 @@ impl Viewer {
     pub fn html(&self) -> Result<String, FigureError> {
         self.check()?;
         let frames = self.frames();
-        let nothing = Asked {
-            root_trajectory: Vec::new(),
-            velocity_factors: Vec::new(),
-        };
+        let nothing = Asked::default();
         let asked = self.asked.as_ref().unwrap_or(&nothing);
+        let place = |place: &DVec3| place.to_array().map(|x| rounded(x, 1));
         let data = PageData {
             summary: self.summary(),
             frames,
@@ -137,28 +131,16 @@ impl Viewer {
             feet: FOOT_JOINTS,
             parts: PART_LABELS,
             motions: self.motions.iter().map(PageMotion::new).collect(),
-            keyframes: self
-                .keyframes
-                .iter()
-                .map(|keyframe| PageKeyframe {
-                    frame: keyframe.frame,
-                    positions: Steps::new(std::slice::from_ref(&keyframe.positions)),
-                })
-                .collect(),
-            trajectory: asked
-                .root_trajectory
-                .iter()
-                .map(|place| place.to_array().map(|x| rounded(x, 1)))
-                .collect(),
+            keyframes: self.keyframes.iter().map(PageKeyframe::new).collect(),
+            trajectory: asked.root_trajectory.iter().map(place).collect(),
             asked: rounded_rows(&asked.velocity_factors),
         };
         Ok(page::page(&self.title, &data))
     }
 
     fn frames(&self) -> usize {
-        self.motions
-            .first()
-            .map_or(0, |motion| motion.positions.len())
+        let first = self.motions.first();
+        first.map_or(0, |motion| motion.positions.len())
     }
 
     /// "101 frames, 3.3 s at 30 fps, 2 keyframes".
@@ -192,16 +174,14 @@ impl Viewer {
             return Err(self.not_finite("the frame time"));
         }
         let motions = self.motions.iter().flat_map(|motion| {
-            [
-                (motion.name.as_str(), motion.positions.len()),
-                (motion.name.as_str(), motion.contacts.len()),
-                (motion.name.as_str(), motion.velocity_factors.len()),
-            ]
+            let (contacts, factors) = (motion.contacts.len(), motion.velocity_factors.len());
+            [motion.positions.len(), contacts, factors].map(|rows| (motion.name.as_str(), rows))
         });
         let asked = self.asked.iter().flat_map(|asked| {
+            let (places, factors) = (asked.root_trajectory.len(), asked.velocity_factors.len());
             [
-                ("the root trajectory", asked.root_trajectory.len()),
-                ("the velocity factors", asked.velocity_factors.len()),
+                ("the root trajectory", places),
+                ("the velocity factors", factors),
             ]
         });
         if let Some((row, found)) = motions.chain(asked).find(|(_, count)| *count != frames) {
@@ -223,32 +203,25 @@ impl Viewer {
     }
 
     fn check_numbers(&self) -> Result<(), FigureError> {
+        let factors = |rows: &[[f64; PARTS]]| rows.iter().flatten().all(|x| x.is_finite());
+        let places = |places: &[DVec3]| places.iter().all(|place| place.is_finite());
         for motion in &self.motions {
-            let finite = motion.positions.iter().flatten().all(|x| x.is_finite())
-                && motion
-                    .velocity_factors
-                    .iter()
-                    .flatten()
-                    .all(|x| x.is_finite());
-            if !finite {
+            let bodies = motion.positions.as_flattened();
+            if !(places(bodies) && factors(&motion.velocity_factors)) {
                 return Err(self.not_finite(&motion.name));
             }
         }
-        let mut given = self.keyframes.iter().flat_map(|key| &key.positions);
-        if !given.all(|x| x.is_finite()) {
+        if !self.keyframes.iter().all(|key| places(&key.positions)) {
             return Err(self.not_finite("a keyframe"));
         }
-        if let Some(asked) = &self.asked
-            && !(asked.root_trajectory.iter().all(|x| x.is_finite())
-                && asked
-                    .velocity_factors
-                    .iter()
-                    .flatten()
-                    .all(|x| x.is_finite()))
-        {
-            return Err(self.not_finite("what was asked for"));
+        match &self.asked {
+            Some(asked)
+                if !(places(&asked.root_trajectory) && factors(&asked.velocity_factors)) =>
+            {
+                Err(self.not_finite("what was asked for"))
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn not_finite(&self, series: &str) -> FigureError {
@@ -291,6 +264,15 @@ struct PageMotion<'v> {
 struct PageKeyframe {
     frame: usize,
     positions: Steps,
+}
+
+impl PageKeyframe {
+    fn new(keyframe: &ViewerKeyframe) -> Self {
+        Self {
+            frame: keyframe.frame,
+            positions: Steps::new(&[keyframe.positions]),
+        }
+    }
 }
 
 impl<'v> PageMotion<'v> {

@@ -1,12 +1,12 @@
 //! Figures 11 and 12: several models on the same transition.
 
-use super::root::{root_distances, row_with_paths};
+use super::root::{root_distance, row_with_paths};
 use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
 use crate::evaluation::equations::{WindowScores, window_scores};
 use crate::motion::placement::world_positions;
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, PathView, Placing, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, PathView, Placing, ReportError, Shown};
 use ndarray::s;
 
 /// Frames from one drawn dancer to the next.
@@ -22,34 +22,29 @@ pub struct Entry {
 }
 
 /// Figure 11: motions and root trajectories of the models.
-pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let mut said = Vec::new();
-    for entry in entries.iter().filter(|entry| entry.drawn_with_root) {
-        rows.push(row_with_paths(
-            &entry.name,
-            &entry.generated[0],
-            PathView::Above,
-        ));
-        let distances: Vec<f64> = entry
-            .generated
-            .iter()
-            .map(|generated| mean(&root_distances(generated)))
-            .collect();
-        numbers.add(&entry.name, "root_distance_mean", mean(&distances), "cm");
-        let shown = mean(&root_distances(&entry.generated[0]));
-        numbers.add(&entry.name, "root_distance_of_shown", shown, "cm");
-        said.push(format!("{} {:.1} cm", entry.name, mean(&distances)));
+    for Entry {
+        name, generated, ..
+    } in entries.iter().filter(|entry| entry.drawn_with_root)
+    {
+        rows.push(row_with_paths(name, &generated[0], PathView::Above));
+        let distance = mean(generated.iter().map(root_distance));
+        numbers.add(name, "root_distance_mean", distance, "cm");
+        let shown = root_distance(&generated[0]);
+        numbers.add(name, "root_distance_of_shown", shown, "cm");
+        said.push(format!("{name} {distance:.1} cm"));
     }
-    numbers.add("all windows", "windows", stage.windows().len() as f64, "");
-    let alone = if rows.len() < 2 {
-        " No other trained run was given to compare with (--compare)."
-    } else {
-        ""
+    stage.count(&mut numbers);
+    let alone = match rows.len() {
+        0 | 1 => " No other trained run was given to compare with (--compare).",
+        _ => "",
     };
     let caption = format!(
-        "Figure 11. Motion and root trajectory of models on one transition, every {EVERY} frames; mean distance of the root from its target {}: {}.{alone}",
+        "Figure 11. Motion and root trajectory of models on one transition, every {EVERY} frames; \
+         mean distance of the root from its target {}: {}.{alone}",
         stage.measured_on(),
         said.join(", ")
     );
@@ -59,51 +54,41 @@ pub fn figure_11(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresErro
 }
 
 /// Figure 12: the recorded motion and every model's.
-pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresError> {
+pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let recorded = positions(stage.shown().recorded.view());
-    let mut rows = vec![MotionRow::between_keyframes(
-        "Ground truth",
-        recorded,
-        false,
-    )];
+    let recorded = MotionRow::between_keyframes("Ground truth", recorded, false);
+    let mut rows = vec![recorded];
     let mut said = Vec::new();
-    for entry in entries {
-        rows.push(MotionRow::between_keyframes(
-            &entry.name,
-            entry.generated[0].drawn(),
-            true,
-        ));
-        let scores: Vec<WindowScores> = stage
-            .windows()
-            .iter()
-            .zip(&entry.generated)
-            .map(|(window, generated)| {
-                window_scores(window.recorded.view(), generated.frames.slice(s![1.., ..]))
-            })
-            .collect::<Result<_, _>>()
-            .map_err(|source| FiguresError::Scores {
-                model: entry.name.clone(),
-                source,
-            })?;
-        let of =
-            |score: fn(&WindowScores) -> f64| mean(&scores.iter().map(score).collect::<Vec<_>>());
+    for Entry {
+        name, generated, ..
+    } in entries
+    {
+        rows.push(generated[0].row(name));
+        let scores = stage.windows().iter().zip(generated).map(|(window, it)| {
+            window_scores(window.recorded.view(), it.frames.slice(s![1.., ..]))
+        });
+        let scores: Vec<WindowScores> =
+            scores
+                .collect::<Result<_, _>>()
+                .map_err(|source| ReportError::Scores {
+                    model: name.clone(),
+                    source,
+                })?;
+        let of = |score: fn(&WindowScores) -> f64| mean(scores.iter().map(score));
         let lrp = of(|scores| scores.body_position);
-        numbers.add(&entry.name, "LRP", lrp, "cm");
+        numbers.add(name, "LRP", lrp, "cm");
         let factors = of(|scores| scores.velocity_factor);
-        numbers.add(&entry.name, "velocity_factor_error", factors, "cm/frame");
-        numbers.add(&entry.name, "root_distance", of(|scores| scores.root), "cm");
-        let missed: Vec<f64> = entry.generated.iter().map(keyframe_miss).collect();
-        numbers.add(&entry.name, "keyframe_miss", mean(&missed), "cm");
-        said.push(format!(
-            "{} {lrp:.1} and {:.1} cm",
-            entry.name,
-            mean(&missed)
-        ));
+        numbers.add(name, "velocity_factor_error", factors, "cm/frame");
+        numbers.add(name, "root_distance", of(|scores| scores.root), "cm");
+        let missed = mean(generated.iter().map(keyframe_miss));
+        numbers.add(name, "keyframe_miss", missed, "cm");
+        said.push(format!("{name} {lrp:.1} and {missed:.1} cm"));
     }
-    numbers.add("all windows", "windows", stage.windows().len() as f64, "");
+    stage.count(&mut numbers);
     let caption = format!(
-        "Figure 12. One transition as recorded and as generated, every {EVERY} frames; LRP, and mean joint distance from the keyframe at its frame, {}: {}.",
+        "Figure 12. One transition as recorded and as generated, every {EVERY} frames; LRP, and \
+         mean joint distance from the keyframe at its frame, {}: {}.",
         stage.measured_on(),
         said.join(", ")
     );
@@ -119,16 +104,9 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, FiguresErro
 
 /// Mean distance of the last predicted frame's joints from the keyframe's, cm.
 fn keyframe_miss(generated: &Generated) -> f64 {
-    let (predicted, given) = (
-        positions(generated.frames.view()),
-        &generated.request.keyframes,
-    );
+    let given = &generated.request.keyframes;
     let wanted = world_positions(given[given.len() - 1].keyframe.features.view());
-    let last = predicted[predicted.len() - 1];
-    let distances: Vec<f64> = last
-        .iter()
-        .zip(wanted)
-        .map(|(a, b)| a.distance(b))
-        .collect();
-    mean(&distances)
+    let frames = &generated.frames;
+    let last = world_positions(frames.row(frames.nrows() - 1));
+    mean(last.iter().zip(wanted).map(|(a, b)| a.distance(b)))
 }

@@ -11,13 +11,12 @@ pub use stage::{Choice, Stage, Window};
 
 use std::path::Path;
 
-use super::{Figure, FiguresError};
+use super::Figure;
 use crate::data::Dataset;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::Kind;
 use crate::models::{Generator, ModelKind as _};
-use crate::report::viewer::RequestMotion;
-use crate::report::{MotionKind, Viewer};
+use crate::report::{MotionKind, ReportError, Viewer, ViewerMotion};
 use crate::run::Subject;
 use crate::synthesis::{SynthesisOptions, synthesise};
 use comparison::Entry;
@@ -34,16 +33,17 @@ impl Cast {
     ///
     /// # Errors
     /// The models were made for other features of the data, so they cannot be compared.
-    pub fn new(subject: Subject, compared: Vec<Subject>) -> Result<Self, FiguresError> {
+    pub fn new(subject: Subject, compared: Vec<Subject>) -> Result<Self, ReportError> {
         for other in &compared {
             let (ours, theirs) = (&subject.config.data, &other.config.data);
             if (ours.fps, ours.features(), &ours.mapping)
                 != (theirs.fps, theirs.features(), &theirs.mapping)
             {
-                return Err(FiguresError::OtherFeatures {
-                    subject: subject.what.clone(),
-                    other: other.what.clone(),
-                });
+                return Err(ReportError::Refused(format!(
+                    "{} was made for data at another rate, or with another mapping, contact \
+                     threshold or facing_sigma than {}: they cannot be compared",
+                    other.what, subject.what
+                )));
             }
         }
         let interpolation = Interpolation {
@@ -65,7 +65,7 @@ impl Cast {
     ///
     /// # Errors
     /// As [`Subject::check_data`].
-    pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), FiguresError> {
+    pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), ReportError> {
         for subject in std::iter::once(&self.subject).chain(&self.compared) {
             subject.check_data(dataset, folder)?;
         }
@@ -76,7 +76,7 @@ impl Cast {
     ///
     /// # Errors
     /// A model fails, a control does not fit, or there is nothing to draw.
-    pub fn figures(&self, stage: &Stage) -> Result<Vec<Figure>, FiguresError> {
+    pub fn figures(&self, stage: &Stage) -> Result<Vec<Figure>, ReportError> {
         let model = self.subject.model.as_ref();
         let name = &self.subject.config.name;
         let plain = stage.generate(model, Ok)?;
@@ -111,37 +111,25 @@ impl Cast {
     ///
     /// # Errors
     /// A model fails, or the page cannot be made.
-    pub fn page(&self, stage: &Stage) -> Result<String, FiguresError> {
+    pub fn page(&self, stage: &Stage) -> Result<String, ReportError> {
         let window = stage.shown();
         let options = SynthesisOptions::default();
         let name = self.subject.config.name.as_str();
-        let mut models: Vec<(&str, MotionKind, &dyn Generator)> = Vec::new();
-        models.extend(
-            self.others()
-                .into_iter()
-                .map(|(name, _, model)| (name, MotionKind::Other, model)),
-        );
-        models.push((name, MotionKind::Model, self.subject.model.as_ref()));
-        let mut sequences = Vec::new();
-        for (name, kind, model) in models {
+        let recorded = window.recorded.view();
+        let mut motions = vec![ViewerMotion::from_features(
+            "Ground truth",
+            MotionKind::Recorded,
+            recorded,
+        )];
+        let others = self.others().into_iter();
+        let others = others.map(|(name, _, model)| (name, MotionKind::Other, model));
+        let subject = (name, MotionKind::Model, self.subject.model.as_ref());
+        for (name, kind, model) in others.chain([subject]) {
             let sequence = synthesise(model, &window.request, &options, name)?;
-            sequences.push((name, kind, sequence));
+            let frames = sequence.features.view();
+            motions.push(ViewerMotion::from_features(name, kind, frames));
         }
-        let mut motions = vec![RequestMotion {
-            name: "Ground truth",
-            kind: MotionKind::Recorded,
-            frames: window.recorded.view(),
-        }];
-        motions.extend(
-            sequences
-                .iter()
-                .map(|(name, kind, sequence)| RequestMotion {
-                    name,
-                    kind: *kind,
-                    frames: sequence.features.view(),
-                }),
-        );
-        Ok(Viewer::of_request(&window.describe(), &window.request, &motions).html()?)
+        Ok(Viewer::of_request(&window.describe(), &window.request, motions).html()?)
     }
 
     /// Name, whether it was trained, and model: interpolation unless it is among those given, then those to set beside.
@@ -154,11 +142,7 @@ impl Cast {
         models.extend(self.compared.iter().map(|subject| {
             let config = &subject.config;
             let trained = config.model.untrained(&config.data).is_none();
-            (
-                subject.config.name.as_str(),
-                trained,
-                subject.model.as_ref(),
-            )
+            (config.name.as_str(), trained, subject.model.as_ref())
         }));
         models
     }

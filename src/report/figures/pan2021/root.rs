@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use super::stage::{Generated, Stage};
-use super::wording::{Verdict, mean, percent};
+use super::wording::{mean, percent, verdict};
 use crate::evaluation::equations::Equations;
 use crate::models::Generator;
 use crate::models::transition::effect::{Response, body_distance, root_response};
-use crate::report::figures::{Figure, FiguresError, Numbers};
-use crate::report::{MotionFigure, MotionRow, PathView, RootPaths, Shown};
+use crate::report::figures::{Figure, Numbers};
+use crate::report::{MotionFigure, MotionRow, PathView, ReportError, RootPaths, Shown};
 use crate::synthesis::controls::{Speed, smooth_curve};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
@@ -21,7 +21,7 @@ const DETOUR: f64 = 60.0;
 
 /// Figure 5: generated motions and their root trajectories beside the targets. `plain`: the model
 /// under the clips' own controls.
-pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, FiguresError> {
+pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut rows = Vec::new();
     let pairs = stage.windows().iter().zip(plain);
@@ -29,44 +29,34 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figur
         let label = format!("clip {}", number + 1);
         rows.push(row_with_paths(&label, generated, PathView::Above));
         let label = window.describe();
-        let distances = root_distances(generated);
-        numbers.add(&label, "root_distance_mean", mean(&distances), "cm");
-        let most = distances.iter().copied().fold(0.0, f64::max);
+        let distance = root_distance(generated);
+        numbers.add(&label, "root_distance_mean", distance, "cm");
+        let most = root_distances(generated).fold(0.0, f64::max);
         numbers.add(&label, "root_distance_max", most, "cm");
     }
-    let distances: Vec<f64> = plain
-        .iter()
-        .map(|generated| mean(&root_distances(generated)))
-        .collect();
+    let distances: Vec<f64> = plain.iter().map(root_distance).collect();
+    let distance = mean(distances.iter().copied());
     let threshold = Equations::default().root_threshold;
-    let within = distances
-        .iter()
-        .filter(|distance| **distance < threshold)
-        .count();
-    numbers.add("all windows", "windows", plain.len() as f64, "");
-    numbers.add("all windows", "root_distance_mean", mean(&distances), "cm");
+    let within = distances.iter().filter(|it| **it < threshold).count();
+    stage.count(&mut numbers);
+    numbers.add("all windows", "root_distance_mean", distance, "cm");
     numbers.add("all windows", "windows_within_7_cm", within as f64, "");
-    let names: Vec<&str> = stage
-        .windows()
-        .iter()
-        .take(2)
-        .map(|window| window.clip.name.as_str())
-        .collect();
+    let shown = stage.windows().iter().take(2);
+    let names: Vec<&str> = shown.map(|window| window.clip.name.as_str()).collect();
     let clips = match names.len() {
         1 => "a test clip",
         _ => "two test clips",
     };
     let names = names.join(" and ");
-    let verdict = if 2 * within > plain.len() {
-        "keeps to"
-    } else {
-        "does not keep to"
+    let verdict = match 2 * within > plain.len() {
+        true => "keeps to",
+        false => "does not keep to",
     };
     let caption = format!(
-        "Figure 5. Motion generated for {clips} and its root trajectory beside the target, every {EVERY} frames: {} the root is {:.1} cm from the target, \
-         in {within} of {} less than {threshold} cm; {model} {verdict} its target so closely.",
+        "Figure 5. Motion generated for {clips} and its root trajectory beside the target, every \
+         {EVERY} frames: {} the root is {distance:.1} cm from the target, in {within} of {} less \
+         than {threshold} cm; {model} {verdict} its target so closely.",
         stage.measured_on(),
-        mean(&distances),
         plain.len()
     );
     let title = format!("Figure 5: {model} on {names}");
@@ -79,22 +69,17 @@ pub fn figure_6(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let lowered = stage.generate(model, |request| Ok(request.raised(-HEIGHT)))?;
     let raised = stage.generate(model, |request| Ok(request.raised(HEIGHT)))?;
-    let row = |label: &str, of: &[Generated]| row_with_paths(label, &of[0], PathView::Height);
     let labels = [
         format!("root {HEIGHT} cm lower"),
         "as recorded".into(),
         format!("root {HEIGHT} cm higher"),
     ];
-    let rows = [&lowered[..], plain, &raised[..]];
-    let rows = labels
-        .iter()
-        .zip(rows)
-        .map(|(label, of)| row(label, of))
-        .collect();
+    let rows = labels.iter().zip([&lowered[0], &plain[0], &raised[0]]);
+    let rows = rows.map(|(label, of)| row_with_paths(label, of, PathView::Height));
     let responses = [(&labels[0], &lowered), (&labels[2], &raised)].map(|(label, changed)| {
         let response = responses(changed, plain);
         record(&mut numbers, label, response);
@@ -102,22 +87,20 @@ pub fn figure_6(
         numbers.add(label, "body_distance_from_as_recorded", distance, "cm");
         (response, distance)
     });
-    numbers.add("all windows", "windows", plain.len() as f64, "");
+    stage.count(&mut numbers);
+    let [(lower, lower_bodies), (higher, higher_bodies)] = responses;
     let caption = format!(
-        "Figure 6. One transition with the root {HEIGHT} cm lower and higher halfway, every {EVERY} frames: {} the root gives {} of the lowering and {} of the raising, \
-         bodies differ from those of the recorded height by {:.1} and {:.1} cm a joint; {}.",
+        "Figure 6. One transition with the root {HEIGHT} cm lower and higher halfway, every \
+         {EVERY} frames: {} the root gives {} of the lowering and {} of the raising, bodies differ \
+         from those of the recorded height by {lower_bodies:.1} and {higher_bodies:.1} cm a joint; \
+         {}.",
         stage.measured_on(),
-        percent(responses[0].0.share()),
-        percent(responses[1].0.share()),
-        responses[0].1,
-        responses[1].1,
-        Verdict::of(
-            model.name(),
-            "the root's height",
-            &responses.map(|(response, _)| response)
-        )
+        percent(lower.share()),
+        percent(higher.share()),
+        verdict(model.name(), "the root's height", &[lower, higher])
     );
     let title = stage.title("Figure 6", model.name());
+    let rows = rows.collect();
     let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
     Figure::of_dancers("figure_6", drawing, numbers)
 }
@@ -127,7 +110,7 @@ pub fn figure_7(
     stage: &Stage,
     model: &dyn Generator,
     plain: &[Generated],
-) -> Result<Figure, FiguresError> {
+) -> Result<Figure, ReportError> {
     let paths: [(&str, &[f64]); 3] = [
         ("to the left", &[1.0]),
         ("to the right", &[-1.0]),
@@ -136,24 +119,17 @@ pub fn figure_7(
     let mut numbers = Numbers::default();
     let mut rows = vec![row_with_paths("as recorded", &plain[0], PathView::Above)];
     let mut results: Vec<(&str, Vec<Generated>)> = Vec::new();
+    let mut answers = Vec::new();
     for (label, sides) in paths {
         let generated = stage.generate(model, |request| detour(request, sides))?;
         rows.push(row_with_paths(label, &generated[0], PathView::Above));
-        results.push((label, generated));
-    }
-    let mut answers = Vec::new();
-    for (label, generated) in &results {
-        let response = responses(generated, plain);
+        let response = responses(&generated, plain);
         record(&mut numbers, label, response);
         answers.push(response);
+        results.push((label, generated));
     }
-    let all: Vec<(&str, &[Generated])> = std::iter::once(("as recorded", plain))
-        .chain(
-            results
-                .iter()
-                .map(|(label, generated)| (*label, &generated[..])),
-        )
-        .collect();
+    let mut all = vec![("as recorded", plain)];
+    all.extend(results.iter().map(|(label, result)| (*label, &result[..])));
     let mut distances = Vec::new();
     for (index, (label, generated)) in all.iter().enumerate() {
         for (other, against) in &all[..index] {
@@ -163,24 +139,17 @@ pub fn figure_7(
             distances.push(distance);
         }
     }
-    numbers.add("all windows", "windows", plain.len() as f64, "");
-    numbers.add(
-        "all windows",
-        "body_distance_mean_of_pairs",
-        mean(&distances),
-        "cm",
-    );
-    let shares: Vec<String> = answers
-        .iter()
-        .map(|answer| percent(answer.share()))
-        .collect();
+    stage.count(&mut numbers);
+    let apart = mean(distances);
+    numbers.add("all windows", "body_distance_mean_of_pairs", apart, "cm");
+    let shares: Vec<String> = answers.iter().map(|it| percent(it.share())).collect();
     let caption = format!(
-        "Figure 7. One transition on the recorded and three other root trajectories, all else the same, every {EVERY} frames: {} the root gives {} of the changes, \
-         the bodies of two results are {:.1} cm a joint apart; {}.",
+        "Figure 7. One transition on the recorded and three other root trajectories, all else the \
+         same, every {EVERY} frames: {} the root gives {} of the changes, the bodies of two \
+         results are {apart:.1} cm a joint apart; {}.",
         stage.measured_on(),
         shares.join(", "),
-        mean(&distances),
-        Verdict::of(model.name(), "the root trajectory", &answers)
+        verdict(model.name(), "the root trajectory", &answers)
     );
     let title = stage.title("Figure 7", model.name());
     let drawing = MotionFigure::on_own_paths(title, caption, rows, Shown::Every(EVERY));
@@ -209,12 +178,14 @@ fn detour(request: SequenceRequest, sides: &[f64]) -> Result<SequenceRequest, Sy
 }
 
 /// Root distances from the target in the predicted frames, cm.
-pub fn root_distances(generated: &Generated) -> Vec<f64> {
+fn root_distances(generated: &Generated) -> impl Iterator<Item = f64> {
     let pairs = generated.roots().into_iter().zip(generated.target());
-    pairs
-        .skip(1)
-        .map(|(root, target)| root.distance(target))
-        .collect()
+    pairs.skip(1).map(|(root, target)| root.distance(target))
+}
+
+/// Their mean.
+pub fn root_distance(generated: &Generated) -> f64 {
+    mean(root_distances(generated))
 }
 
 /// A row of dancers with its root trajectories beside it.
@@ -225,7 +196,7 @@ pub fn row_with_paths(label: &str, generated: &Generated, view: PathView) -> Mot
             target: generated.target(),
             generated: generated.roots(),
         }),
-        ..MotionRow::between_keyframes(label, generated.drawn(), true)
+        ..generated.row(label)
     }
 }
 
@@ -241,12 +212,8 @@ fn responses(changed: &[Generated], plain: &[Generated]) -> Response {
 
 /// Mean over the windows of the distance between two results, cm a joint.
 pub fn mean_body_distance(a: &[Generated], b: &[Generated]) -> f64 {
-    let distances: Vec<f64> = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| body_distance(a.frames.view(), b.frames.view()))
-        .collect();
-    mean(&distances)
+    let pairs = a.iter().zip(b);
+    mean(pairs.map(|(a, b)| body_distance(a.frames.view(), b.frames.view())))
 }
 
 fn record(numbers: &mut Numbers, label: &str, response: Response) {

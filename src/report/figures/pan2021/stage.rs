@@ -4,13 +4,13 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
-use crate::models::transition::DanceClip;
-use crate::models::transition::{check_frames, window_features};
+use crate::models::transition::{DanceClip, check_frames, window_features};
 use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
-use crate::report::figures::FiguresError;
+use crate::report::figures::Numbers;
+use crate::report::{MotionRow, ReportError};
 use crate::synthesis::{SequenceRequest, SynthesisError};
 
 /// Windows that a model predicts in one call.
@@ -52,12 +52,10 @@ impl<'d> Stage<'d> {
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
-    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, FiguresError> {
+    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, ReportError> {
         let needed = choice.length + 1;
-        let mut fitting: Vec<&DanceClip> = clips
-            .iter()
-            .filter(|clip| clip.frames() >= needed)
-            .collect();
+        let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
+        let mut fitting: Vec<&DanceClip> = fitting.collect();
         fitting.sort_by(|a, b| a.name.cmp(&b.name));
         let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
         let first = match choice.clip {
@@ -65,18 +63,19 @@ impl<'d> Stage<'d> {
             Some(name) => fitting
                 .iter()
                 .position(|clip| clip.name == name)
-                .ok_or_else(|| FiguresError::NoClip {
-                    name: name.into(),
-                    needed,
-                    clips: fitting.iter().map(|clip| clip.name.clone()).collect(),
+                .ok_or_else(|| {
+                    let names: Vec<&str> = fitting.iter().map(|clip| clip.name.as_str()).collect();
+                    ReportError::Refused(format!(
+                        "--clip {name} is not among the test clips with {needed} frames or more: {}",
+                        names.join(", ")
+                    ))
                 })?,
         };
         if fitting.is_empty() {
-            return Err(FiguresError::TooShort {
-                length: choice.length,
-                needed,
-                longest,
-            });
+            return Err(ReportError::Refused(format!(
+                "no test clip has the {needed} frames of --length {} (the longest has {longest})",
+                choice.length
+            )));
         }
         fitting[..=first].rotate_right(1);
         let mut windows = Vec::with_capacity(fitting.len());
@@ -87,13 +86,12 @@ impl<'d> Stage<'d> {
                 _ => last / 2,
             };
             if start > last {
-                return Err(FiguresError::Start {
-                    start,
-                    clip: clip.name.clone(),
-                    frames: clip.frames(),
-                    needed,
-                    last,
-                });
+                return Err(ReportError::Refused(format!(
+                    "--start {start}: {} has {} frames, so a window of {needed} starts at frame \
+                     {last} at the latest",
+                    clip.name,
+                    clip.frames()
+                )));
             }
             windows.push(Window {
                 clip,
@@ -123,6 +121,12 @@ impl<'d> Stage<'d> {
         }
     }
 
+    /// Notes how many windows the means are over.
+    pub fn count(&self, numbers: &mut Numbers) {
+        let windows = self.windows.len() as f64;
+        numbers.add("all windows", "windows", windows, "");
+    }
+
     /// A figure's title: what it is about, by which model, on which window.
     pub fn title(&self, what: &str, model: &str) -> String {
         format!("{what}: {model} on {}", self.shown().describe())
@@ -137,32 +141,25 @@ impl<'d> Stage<'d> {
         &self,
         model: &dyn Generator,
         change: impl Fn(SequenceRequest) -> Result<SequenceRequest, SynthesisError>,
-    ) -> Result<Vec<Generated>, FiguresError> {
-        let requests: Vec<SequenceRequest> = self
-            .windows
-            .iter()
-            .map(|window| change(window.request.clone()))
-            .collect::<Result<_, _>>()?;
-        let pieces: Vec<Request> = requests
-            .iter()
-            .map(|request| request.piece(&request.keyframes))
-            .collect();
+    ) -> Result<Vec<Generated>, ReportError> {
+        let changed = self.windows.iter().map(|it| change(it.request.clone()));
+        let requests: Vec<SequenceRequest> = changed.collect::<Result<_, _>>()?;
+        let pieces = requests.iter().map(|it| it.piece(&it.keyframes));
         let predicted: Vec<Vec<Array2<f64>>> = pieces
+            .collect::<Vec<Request>>()
             .par_chunks(CHUNK)
             .map(|chunk| model.raw(chunk))
             .collect::<Result<_, ModelError>>()?;
         let predicted = predicted.into_iter().flatten();
-        let generated = requests
-            .into_iter()
-            .zip(predicted)
-            .map(|(request, predicted)| {
-                check_frames(predicted.view(), request.frames() - 1)?;
-                let mut frames = Array2::zeros((request.frames(), FRAME));
-                let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
-                frames.row_mut(0).assign(&first);
-                frames.slice_mut(s![1.., ..]).assign(&predicted);
-                Ok(Generated { request, frames })
-            });
+        let generated = requests.into_iter().zip(predicted);
+        let generated = generated.map(|(request, predicted)| {
+            check_frames(predicted.view(), request.frames() - 1)?;
+            let mut frames = Array2::zeros((request.frames(), FRAME));
+            let first = request.keyframes[0].keyframe.features.slice(s![..FRAME]);
+            frames.row_mut(0).assign(&first);
+            frames.slice_mut(s![1.., ..]).assign(&predicted);
+            Ok(Generated { request, frames })
+        });
         generated.collect()
     }
 }
@@ -171,24 +168,25 @@ impl Window<'_> {
     /// "NAME, frames 120 to 220 (N = 100)".
     pub fn describe(&self) -> String {
         let length = self.recorded.nrows() - 1;
-        format!(
-            "{}, frames {} to {} (N = {length})",
-            self.clip.name,
-            self.start,
-            self.start + length
-        )
+        let (clip, start, end) = (&self.clip.name, self.start, self.start + length);
+        format!("{clip}, frames {start} to {end} (N = {length})")
     }
 }
 
 impl Generated {
     /// World positions of the joints with the last frame as the keyframe that was given, `[N +
     /// 1][24]`, cm.
-    pub fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
+    fn drawn(&self) -> Vec<[DVec3; JOINTS]> {
         let mut drawn = positions(self.frames.view());
         if let (Some(last), Some(target)) = (drawn.last_mut(), self.request.keyframes.last()) {
             *last = world_positions(target.keyframe.features.view());
         }
         drawn
+    }
+
+    /// A row of dancers from keyframe to keyframe.
+    pub fn row(&self, label: &str) -> MotionRow {
+        MotionRow::between_keyframes(label, self.drawn(), true)
     }
 
     /// Root positions that were asked for, cm.

@@ -1,46 +1,16 @@
 //! How captions say numbers.
 
-use std::fmt;
-
 use crate::models::transition::effect::Response;
 
-/// Whether a model follows a control; its `Display` is the end of a caption.
-pub struct Verdict<'a> {
-    model: &'a str,
-    what: &'a str,
-    followed: usize,
-    of: usize,
-}
-
-impl<'a> Verdict<'a> {
-    /// By the mean responses to the changes of `what`.
-    pub fn of(model: &'a str, what: &'a str, responses: &[Response]) -> Self {
-        let follows = |response: &&Response| response.follows();
-        Self {
-            model,
-            what,
-            followed: responses.iter().filter(follows).count(),
-            of: responses.len(),
-        }
-    }
-}
-
-impl fmt::Display for Verdict<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { model, what, .. } = self;
-        let enough = "(a third of the change or more)";
-        match self.followed {
-            0 => write!(
-                f,
-                "{model} does not follow {what} (less than a third of the change)"
-            ),
-            all if all == self.of => write!(f, "{model} follows {what} {enough}"),
-            some => write!(
-                f,
-                "{model} follows {what} {enough} in {some} of {} cases only",
-                self.of
-            ),
-        }
+/// Whether a model follows a control, by its mean responses to the changes of `what`: the end of a
+/// caption.
+pub fn verdict(model: &str, what: &str, responses: &[Response]) -> String {
+    let follows = |response: &&Response| response.follows();
+    let enough = format!("{model} follows {what} (a third of the change or more)");
+    match (responses.iter().filter(follows).count(), responses.len()) {
+        (0, _) => format!("{model} does not follow {what} (less than a third of the change)"),
+        (followed, all) if followed == all => enough,
+        (followed, all) => format!("{enough} in {followed} of {all} cases only"),
     }
 }
 
@@ -52,7 +22,9 @@ pub fn percent(share: f64) -> String {
     format!("{rounded:.0}\u{a0}%")
 }
 
-pub fn mean(values: &[f64]) -> f64 {
+/// The plain mean; NaN for none.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.into_iter().collect();
     values.iter().sum::<f64>() / values.len() as f64
 }
 
@@ -67,7 +39,7 @@ mod tests {
                 asked: 3.0,
                 measured,
             });
-            Verdict::of("M", "the speed", &responses).to_string()
+            verdict("M", "the speed", &responses)
         };
         assert!(text([0.9, -3.0, 0.0]).starts_with("M does not follow the speed"));
         assert!(text([1.1, 3.0, 2.0]).starts_with("M follows the speed"));

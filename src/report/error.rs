@@ -1,0 +1,78 @@
+//! Why there is nothing to show.
+
+#[cfg(feature = "papers")]
+use crate::{
+    data::{DataError, EmptyPart, choreography::ChoreographyError},
+    experiment::ConfigError,
+    models::{ModelError, settings::ValueError},
+    motion::{bvh::BvhError, fit::RotationFitError},
+    run::{FileError, RunError},
+    synthesis::SynthesisError,
+};
+
+/// Why a figure cannot be drawn.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FigureError {
+    #[error("the figure {figure:?} has nothing to draw: {what}")]
+    Empty { figure: String, what: &'static str },
+    #[error("the figure {figure:?}: {series} has a NaN or an infinity")]
+    NotFinite { figure: String, series: String },
+    #[error(
+        "the figure {figure:?}: {row} has {found} frames, the first row has {expected}; rows show \
+         the same frames"
+    )]
+    Frames {
+        figure: String,
+        row: String,
+        found: usize,
+        expected: usize,
+    },
+    #[error(
+        "{figure:?}: keyframe {frame} lies outside its {frames} frames, which are numbered from 0"
+    )]
+    Keyframe {
+        figure: String,
+        frame: usize,
+        frames: usize,
+    },
+}
+
+/// Why a demo or a paper's figures cannot be made.
+#[cfg(feature = "papers")]
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// What is asked for cannot be shown: what, and what can.
+    #[error("{0}")]
+    Refused(String),
+    #[error("--fraction is not a share of the schedule")]
+    Fraction(#[source] ValueError),
+    /// The figures' scores of a model, by its name.
+    #[error("{model}")]
+    Scores { model: String, source: ModelError },
+    #[error("the numbers of a figure")]
+    Numbers(#[from] csv::Error),
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Synthesis(#[from] SynthesisError),
+    #[error(transparent)]
+    Rotations(#[from] RotationFitError),
+    #[error(transparent)]
+    Bvh(#[from] BvhError),
+    #[error(transparent)]
+    Choreography(#[from] ChoreographyError),
+    #[error(transparent)]
+    Data(#[from] DataError),
+    #[error(transparent)]
+    EmptyPart(#[from] EmptyPart),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Toml(#[from] toml::ser::Error),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
+    File(#[from] FileError),
+}
