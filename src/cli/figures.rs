@@ -9,9 +9,8 @@ use clap::Args;
 
 use super::threads::Threads;
 use crate::data::Dataset;
-use crate::models::transition::DanceClip;
-use crate::report::figures::index;
-use crate::report::figures::pan2021::{Cast, Choice, Stage};
+use crate::models::registry;
+use crate::report::figures::{DrawnFigures, FigureRequest, index};
 use crate::run::{Subject, replace_file};
 
 /// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
@@ -65,26 +64,27 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         .iter()
         .map(|path| Subject::open(path, &[]))
         .collect::<Result<_, _>>()?;
-    let cast = Cast::new(subject, compared)?;
-    let dataset = Dataset::load(&args.data, &cast.subject().config.data)?;
+    let kind = registry::find(subject.config.model.kind());
+    let paper = kind.context("the model is not in the registry")?.paper();
+    let draw = paper
+        .figures
+        .with_context(|| format!("{} has no figures that could be drawn", paper.name))?;
+    let dataset = Dataset::load(&args.data, &subject.config.data)?;
     if !args.other_data {
-        cast.check_data(&dataset, &args.data)?;
+        for model in compared.iter().chain([&subject]) {
+            model.check_data(&dataset, &args.data)?;
+        }
     }
-    let features = cast.subject().config.data.features();
-    let clips = DanceClip::measure_all(&dataset.test, &features)?;
-    let stage = Stage::new(
-        &clips,
-        &Choice {
-            length: args.length.into(),
-            clip: args.clip.as_deref(),
-            start: args.start,
-        },
-    )?;
-    let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
-    let page = match &args.viewer {
-        Some(_) => Some(cast.page(&stage)?),
-        None => None,
+    let asked = FigureRequest {
+        subject: &subject,
+        compared: &compared,
+        dataset: &dataset,
+        length: args.length.into(),
+        clip: args.clip.as_deref(),
+        start: args.start,
+        page: args.viewer.is_some(),
     };
+    let DrawnFigures { figures, page } = args.threads.pool()?.install(|| draw(&asked))?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{} cannot be created", args.out.display()))?;
     for figure in &figures {
@@ -92,7 +92,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     }
     let about = format!(
         "{} on {} test clips of the data with digest {}.",
-        cast.subject().what,
+        subject.what,
         dataset.test.len(),
         dataset.digest
     );

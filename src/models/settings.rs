@@ -13,17 +13,20 @@ use crate::autograd::check::CheckReport;
 use crate::data::{DataConfig, Dataset};
 use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::nn::Initialiser;
+use crate::report::figures::DrawFigures;
 
 /// What draws a model's initial weights.
 pub type InitialRng = ChaCha8Rng;
 
 /// A paper that models belong to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Paper {
     /// Name of its folders, such as `pan2021`.
     pub name: &'static str,
     /// The numbers that it prints, TOML: see [`crate::evaluation::PrintedTables`].
     pub printed: &'static str,
+    /// What draws its figures.
+    pub figures: Option<DrawFigures>,
 }
 
 /// A kind of model: what a config's `model.kind` names.

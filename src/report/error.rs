@@ -1,14 +1,15 @@
 //! Why there is nothing to show.
 
+use crate::data::choreography::ChoreographyError;
+use crate::data::{DataError, EmptyPart};
+use crate::experiment::ConfigError;
+use crate::models::ModelError;
+use crate::models::settings::ValueError;
+use crate::motion::bvh::BvhError;
+use crate::motion::fit::RotationFitError;
+use crate::run::{FileError, RunError};
 #[cfg(feature = "papers")]
-use crate::{
-    data::{DataError, EmptyPart, choreography::ChoreographyError},
-    experiment::ConfigError,
-    models::{ModelError, settings::ValueError},
-    motion::{bvh::BvhError, fit::RotationFitError},
-    run::{FileError, RunError},
-    synthesis::SynthesisError,
-};
+use crate::synthesis::SynthesisError;
 
 /// Why a figure cannot be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -38,7 +39,6 @@ pub enum FigureError {
 }
 
 /// Why a demo or a paper's figures cannot be made.
-#[cfg(feature = "papers")]
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// What is asked for cannot be shown: what, and what can.
@@ -55,6 +55,7 @@ pub enum ReportError {
     Figure(#[from] FigureError),
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[cfg(feature = "papers")]
     #[error(transparent)]
     Synthesis(#[from] SynthesisError),
     #[error(transparent)]

@@ -9,7 +9,6 @@ mod dancer;
 #[cfg(feature = "papers")]
 pub mod demo;
 mod error;
-#[cfg(feature = "papers")]
 pub mod figures;
 pub mod loss_curve;
 pub mod motion_figure;
@@ -22,9 +21,7 @@ mod thousands;
 pub mod validation_curve;
 pub mod viewer;
 
-pub use error::FigureError;
-#[cfg(feature = "papers")]
-pub use error::ReportError;
+pub use error::{FigureError, ReportError};
 pub use loss_curve::{LossSeries, loss_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};

@@ -66,6 +66,7 @@ impl ModelKind for ToyKind {
             name: "toy2026",
             printed: "title = 'Toy 2026'\ncolumns = ['all']\n[[tables]]\nnumber = 1\nmetric = 'nll'\n\
                 [rows.toy]\ntitle = 'Toy'\nnll = [2.5]",
+            figures: None,
         }
     }
 

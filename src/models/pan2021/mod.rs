@@ -29,6 +29,7 @@ use crate::models::settings::Paper;
 pub const PAPER: Paper = Paper {
     name: "pan2021",
     printed: include_str!("../../../experiments/pan2021/paper.toml"),
+    figures: Some(crate::report::figures::pan2021::draw),
 };
 
 /// The group of learning rates of the controllers' Transformers, which a large rate switches off

@@ -2,6 +2,7 @@
 //! folder a paper.
 
 mod numbers;
+#[cfg(feature = "papers")]
 pub mod pan2021;
 
 pub use numbers::Numbers;
@@ -9,7 +10,36 @@ pub use numbers::Numbers;
 use std::path::Path;
 
 use super::{MotionFigure, ReportError};
-use crate::run::replace_file;
+use crate::data::Dataset;
+use crate::run::{Subject, replace_file};
+
+/// Draws the figures of a paper: a line of [`crate::models::Paper`].
+pub type DrawFigures = fn(&FigureRequest<'_>) -> Result<DrawnFigures, ReportError>;
+
+/// What figures are about.
+pub struct FigureRequest<'a> {
+    /// The model that all figures show.
+    pub subject: &'a Subject,
+    /// Models to set beside it.
+    pub compared: &'a [Subject],
+    /// Test clips are drawn and measured.
+    pub dataset: &'a Dataset,
+    /// Frames of what is shown.
+    pub length: usize,
+    /// The test clip that is shown [default: the first by name that is long enough].
+    pub clip: Option<&'a str>,
+    /// Its first frame [default: what is shown lies in the middle].
+    pub start: Option<usize>,
+    /// Whether a page of the motion viewer is wanted, too.
+    pub page: bool,
+}
+
+/// Figures, and the viewer's page where it was wanted.
+pub struct DrawnFigures {
+    pub figures: Vec<Figure>,
+    /// HTML.
+    pub page: Option<String>,
+}
 
 /// A figure and the numbers behind it.
 pub struct Figure {

@@ -7,76 +7,66 @@ mod stage;
 mod velocity;
 mod wording;
 
-pub use stage::{Choice, Stage, Window};
-
-use std::path::Path;
-
-use super::Figure;
-use crate::data::Dataset;
+use super::{DrawnFigures, Figure, FigureRequest};
 use crate::models::baselines::interpolation::Interpolation;
-use crate::models::transition::Kind;
-use crate::models::{Generator, ModelKind as _};
+use crate::models::transition::{DanceClip, Kind};
+use crate::models::{Generator, ModelError, ModelKind as _};
 use crate::report::{MotionKind, ReportError, Viewer, ViewerMotion};
 use crate::run::Subject;
 use crate::synthesis::{SynthesisOptions, synthesise};
 use comparison::Entry;
+use stage::Stage;
+
+/// Draws them all.
+///
+/// # Errors
+/// Models that were made for other features of the data cannot be compared; the shown clip is not
+/// there; a model fails.
+pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
+    let data = &asked.subject.config.data;
+    for other in asked.compared {
+        let theirs = &other.config.data;
+        if (data.fps, data.features(), &data.mapping)
+            != (theirs.fps, theirs.features(), &theirs.mapping)
+        {
+            return Err(ReportError::Refused(format!(
+                "{} was made for data at another rate, or with another mapping, contact threshold \
+                 or facing_sigma than {}: they cannot be compared",
+                other.what, asked.subject.what
+            )));
+        }
+    }
+    let clips = DanceClip::measure_all(&asked.dataset.test, &data.features())
+        .map_err(|error| ModelError::data(&error))?;
+    let stage = Stage::new(&clips, asked)?;
+    let cast = Cast {
+        subject: asked.subject,
+        compared: asked.compared,
+        interpolation: Interpolation {
+            contact_threshold: data.contact_threshold,
+        },
+    };
+    Ok(DrawnFigures {
+        figures: cast.figures(&stage)?,
+        page: asked.page.then(|| cast.page(&stage)).transpose()?,
+    })
+}
 
 /// The models of the figures.
-pub struct Cast {
-    subject: Subject,
-    compared: Vec<Subject>,
+struct Cast<'a> {
+    /// The one that the figures are about.
+    subject: &'a Subject,
+    /// Those beside it in figures 11 and 12.
+    compared: &'a [Subject],
     interpolation: Interpolation,
 }
 
-impl Cast {
-    /// The model that the figures are about, and those to set beside it in figures 11 and 12.
-    ///
-    /// # Errors
-    /// The models were made for other features of the data, so they cannot be compared.
-    pub fn new(subject: Subject, compared: Vec<Subject>) -> Result<Self, ReportError> {
-        for other in &compared {
-            let (ours, theirs) = (&subject.config.data, &other.config.data);
-            if (ours.fps, ours.features(), &ours.mapping)
-                != (theirs.fps, theirs.features(), &theirs.mapping)
-            {
-                return Err(ReportError::Refused(format!(
-                    "{} was made for data at another rate, or with another mapping, contact \
-                     threshold or facing_sigma than {}: they cannot be compared",
-                    other.what, subject.what
-                )));
-            }
-        }
-        let interpolation = Interpolation {
-            contact_threshold: subject.config.data.contact_threshold,
-        };
-        Ok(Self {
-            subject,
-            compared,
-            interpolation,
-        })
-    }
-
-    /// The model that the figures are about.
-    pub fn subject(&self) -> &Subject {
-        &self.subject
-    }
-
-    /// Refuses data that a model was not trained on, see [`Subject::check_data`].
-    ///
-    /// # Errors
-    /// As [`Subject::check_data`].
-    pub fn check_data(&self, dataset: &Dataset, folder: &Path) -> Result<(), ReportError> {
-        for subject in std::iter::once(&self.subject).chain(&self.compared) {
-            subject.check_data(dataset, folder)?;
-        }
-        Ok(())
-    }
-
+impl Cast<'_> {
     /// All figures, in their order.
     ///
     /// # Errors
     /// A model fails, a control does not fit, or there is nothing to draw.
-    pub fn figures(&self, stage: &Stage) -> Result<Vec<Figure>, ReportError> {
+    fn figures(&self, stage: &Stage) -> Result<Vec<Figure>, ReportError> {
         let model = self.subject.model.as_ref();
         let name = &self.subject.config.name;
         let plain = stage.generate(model, Ok)?;
@@ -111,7 +101,7 @@ impl Cast {
     ///
     /// # Errors
     /// A model fails, or the page cannot be made.
-    pub fn page(&self, stage: &Stage) -> Result<String, ReportError> {
+    fn page(&self, stage: &Stage) -> Result<String, ReportError> {
         let window = stage.shown();
         let options = SynthesisOptions::default();
         let name = self.subject.config.name.as_str();
@@ -132,9 +122,10 @@ impl Cast {
         Ok(Viewer::of_request(&window.describe(), &window.request, motions).html()?)
     }
 
-    /// Name, whether it was trained, and model: interpolation unless it is among those given, then those to set beside.
+    /// Name, whether it was trained, and model: interpolation unless it is among those given, then
+    /// those to set beside.
     fn others(&self) -> Vec<(&str, bool, &dyn Generator)> {
-        let mut given = self.compared.iter().chain([&self.subject]);
+        let mut given = self.compared.iter().chain([self.subject]);
         let mut models: Vec<(&str, bool, &dyn Generator)> = Vec::new();
         if !given.any(|subject| subject.config.model.kind() == Kind::Interpolation.name()) {
             models.push(("Interpolation", false, &self.interpolation));

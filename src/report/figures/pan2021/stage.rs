@@ -9,6 +9,7 @@ use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
 use crate::motion::features::{FRAME, ROOT_POSITION};
 use crate::motion::placement::{vector, world_positions};
+use crate::report::figures::FigureRequest;
 use crate::report::figures::Numbers;
 use crate::report::{MotionRow, ReportError};
 use crate::synthesis::{SequenceRequest, SynthesisError};
@@ -31,13 +32,6 @@ pub struct Window<'d> {
     pub request: SequenceRequest,
 }
 
-/// Which window is shown.
-pub struct Choice<'a> {
-    pub length: usize,
-    pub clip: Option<&'a str>,
-    pub start: Option<usize>,
-}
-
 /// What a model made of a window under some controls.
 pub struct Generated {
     /// What it was asked for.
@@ -52,7 +46,7 @@ impl<'d> Stage<'d> {
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
-    pub fn new(clips: &'d [DanceClip], choice: &Choice) -> Result<Self, ReportError> {
+    pub fn new(clips: &'d [DanceClip], choice: &FigureRequest<'_>) -> Result<Self, ReportError> {
         let needed = choice.length + 1;
         let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
         let mut fitting: Vec<&DanceClip> = fitting.collect();
