@@ -50,3 +50,11 @@ pub struct Clip {
     pub frame_time: f64,
     pub poses: Vec<Pose>,
 }
+
+impl Skeleton {
+    /// World positions of the joints in every pose, `[poses][joints]`, cm.
+    pub fn world_positions(&self, poses: &[Pose]) -> Vec<Vec<DVec3>> {
+        let poses = poses.iter();
+        poses.map(|pose| pose.world_positions(self)).collect()
+    }
+}

@@ -87,11 +87,7 @@ pub enum FeatureError {
 /// The clip is on another skeleton or has no frames; a setting is not a positive number.
 pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, FeatureError> {
     check(clip, config)?;
-    let world: Vec<Vec<DVec3>> = clip
-        .poses
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect();
+    let world = clip.skeleton.world_positions(&clip.poses);
     let facing = facing_angles(&world, config.facing_sigma);
     let contacts = contacts(&world, config.contact_threshold);
     let mut features = Array2::zeros((world.len(), FEATURES));
