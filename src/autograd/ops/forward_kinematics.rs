@@ -230,26 +230,25 @@ fn rotation_gradient<T: Real>(
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     /// Trees of drawn parents, two roots among them, on quaternions that need not have length 1.
     pub fn cases() -> Cases {
         let parents = prop::collection::vec(any::<Option<prop::sample::Index>>(), 1..5);
-        (parents, 0usize..3, 1usize..3, any::<u64>())
-            .prop_map(|(drawn, frames, bodies, seed)| {
-                let parents: Vec<Option<usize>> = drawn
-                    .iter()
-                    .enumerate()
-                    .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
-                    .collect();
-                let joints = parents.len();
-                let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
-                    // Deep trees of long quaternions grow large.
-                    Ok(tape.affine(positions, 0.01, 0.0))
-                })
+        let inputs = (parents, 0usize..3, 1usize..3);
+        drawn(inputs, |(drawn, frames, bodies), seed| {
+            let parents: Vec<Option<usize>> = drawn
+                .iter()
+                .enumerate()
+                .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
+                .collect();
+            let joints = parents.len();
+            let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
+                // Deep trees of long quaternions grow large.
+                Ok(tape.affine(positions, 0.01, 0.0))
             })
-            .boxed()
+        })
     }
 }

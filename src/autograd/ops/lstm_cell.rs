@@ -206,36 +206,33 @@ impl<T: Real> Tape<'_, T> {
 
 #[cfg(test)]
 pub(super) mod gradient {
-    use proptest::prelude::*;
-
     use super::LstmWeights;
-    use crate::autograd::check::property::{Cases, case, strength};
+    use crate::autograd::check::property::{Cases, case, drawn, strength};
 
     /// Two steps through time, so that the state's gradient flows back and the weights' adds up;
     /// gates saturated and not.
     pub fn cases() -> Cases {
-        (0usize..3, 0usize..4, 1usize..3, strength(), any::<u64>())
-            .prop_map(|(batch, inputs, n, strength, seed)| {
-                let shapes: [&[usize]; 6] = [
-                    &[batch, inputs],
-                    &[batch, 2 * n],
-                    &[4 * n, inputs],
-                    &[4 * n, n],
-                    &[4 * n],
-                    &[4 * n],
-                ];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    let x = tape.affine(v[0], strength, 0.0);
-                    let weights = LstmWeights {
-                        weight_ih: v[2],
-                        weight_hh: v[3],
-                        bias_ih: v[4],
-                        bias_hh: v[5],
-                    };
-                    let state = tape.lstm_cell(x, v[1], weights)?;
-                    tape.lstm_cell(x, state, weights)
-                })
+        let inputs = (0usize..3, 0usize..4, 1usize..3, strength());
+        drawn(inputs, |(batch, inputs, n, strength), seed| {
+            let shapes: [&[usize]; 6] = [
+                &[batch, inputs],
+                &[batch, 2 * n],
+                &[4 * n, inputs],
+                &[4 * n, n],
+                &[4 * n],
+                &[4 * n],
+            ];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                let x = tape.affine(v[0], strength, 0.0);
+                let weights = LstmWeights {
+                    weight_ih: v[2],
+                    weight_hh: v[3],
+                    bias_ih: v[4],
+                    bias_hh: v[5],
+                };
+                let state = tape.lstm_cell(x, v[1], weights)?;
+                tape.lstm_cell(x, state, weights)
             })
-            .boxed()
+        })
     }
 }
