@@ -44,7 +44,7 @@ impl TransitionModel for Interpolation {
             self.contact_threshold,
             |request, share, mut row| {
                 let (start, target) = (&request.start, &request.target);
-                let pose = between(&facing_pose(start), &facing_pose(target), share);
+                let pose = facing_pose(start).towards(&facing_pose(target), share);
                 let body = body_positions(&pose, &request.skeleton);
                 for (column, position) in BODY_POSITIONS.step_by(3).zip(&body) {
                     row[column] = position.x;
@@ -63,30 +63,6 @@ fn facing_pose(keyframe: &KeyframePose) -> Pose {
     let turned = DQuat::from_rotation_y(-keyframe.features[FACING.start]);
     pose.rotations[0] = turned * pose.rotations[0];
     pose
-}
-
-/// The pose `share` of the way from `start` to `target`.
-fn between(start: &Pose, target: &Pose, share: f64) -> Pose {
-    Pose {
-        translations: start
-            .translations
-            .iter()
-            .zip(&target.translations)
-            .map(|(a, b)| a.lerp(*b, share))
-            .collect(),
-        rotations: start
-            .rotations
-            .iter()
-            .zip(&target.rotations)
-            .map(|(a, b)| slerp(*a, *b, share))
-            .collect(),
-    }
-}
-
-/// Slerp along the shorter arc; `share` 0 and 1 give the ends.
-fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
-    let b = if a.dot(b) < 0.0 { -b } else { b };
-    a.slerp(b, share).normalize()
 }
 
 /// Positions of the 23 joints other than the root, relative to the root, in the pose's own frame.
