@@ -18,11 +18,8 @@ impl<T: Real> Operation<T> for Concat {
                 && width > 0
             {
                 let fresh = target.fresh;
-                for (dx, dy) in target
-                    .data
-                    .chunks_exact_mut(width)
-                    .zip(dy.chunks_exact(self.total))
-                {
+                let rows = target.data.chunks_exact_mut(width);
+                for (dx, dy) in rows.zip(dy.chunks_exact(self.total)) {
                     let dy = &dy[start..start + width];
                     if fresh {
                         dx.copy_from_slice(dy);

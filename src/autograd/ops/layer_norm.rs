@@ -133,10 +133,8 @@ pub(super) fn layer_norm<T: Real>(
         vectorised(
             #[inline(always)]
             || {
-                for (z, statistics) in y
-                    .chunks_exact_mut(columns)
-                    .zip(statistics.chunks_exact_mut(2))
-                {
+                let rows = y.chunks_exact_mut(columns);
+                for (z, statistics) in rows.zip(statistics.chunks_exact_mut(2)) {
                     let (z, g, b) = (&mut z[..columns], &g[..columns], &b[..columns]);
                     let mean = sum_with(columns, |j| z[j]) * scale;
                     let variance = sum_with(columns, |j| (z[j] - mean) * (z[j] - mean)) * scale;

@@ -257,21 +257,18 @@ impl<T: Real> Tape<'_, T> {
                 self.give(std::mem::take(buffer));
             }
         }
-        Ok(
-            self.record("query_attention", &inputs, &[batch, all], y, || {
-                QueryAttention {
-                    q,
-                    x,
-                    weights,
-                    sizes,
-                    dropout,
-                    u,
-                    p: attention,
-                    m,
-                    z,
-                }
-            }),
-        )
+        let operation = || QueryAttention {
+            q,
+            x,
+            weights,
+            sizes,
+            dropout,
+            u,
+            p: attention,
+            m,
+            z,
+        };
+        Ok(self.record("query_attention", &inputs, &[batch, all], y, operation))
     }
 
     fn query_attention_sizes(
