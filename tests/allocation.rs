@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
 use keydance::models::pan2021::{Controllers, Pan2021, Pan2021Config};
-use keydance::models::transition::gradient_check::generated_windows;
+use keydance::models::transition::gradient_check::generated_batch;
 use keydance::models::transition::{Batch, Feed, Network};
 use keydance::nn::Initialiser;
 use keydance::optim::{Adam, AdamConfig};
@@ -74,14 +74,14 @@ struct Step {
 fn steps(config: &Pan2021Config, feed: Feed, windows: &[usize]) -> Vec<Step> {
     let _counting = COUNTING.lock().unwrap();
     let most = windows.iter().copied().max().unwrap();
-    let (features, standardisation) = generated_windows(12, most, 3).unwrap();
+    let (whole, standardisation) = generated_batch(12, most, 3).unwrap();
     let mut parameters = Parameters::<f32>::new();
     let mut init = Initialiser::new(&mut parameters, ChaCha8Rng::seed_from_u64(1));
     let network = Pan2021::new(&mut init, config, &standardisation).unwrap();
     let batches: Vec<_> = windows
         .iter()
         .map(|&windows| {
-            let features = features.slice(s![.., ..windows, ..]);
+            let features = whole.features.slice(s![.., ..windows, ..]);
             Batch::of(features.mapv(|x| x as f32))
         })
         .collect();

@@ -85,10 +85,8 @@ impl<T: Real> Parameters<T> {
     /// All that a weights file holds, to be changed: parameters, then buffers.
     pub fn saved_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
         self.forget_packed();
-        self.parameters
-            .iter_mut()
-            .chain(&mut self.buffers)
-            .map(|saved| (saved.name.as_str(), &mut saved.value))
+        let saved = self.parameters.iter_mut().chain(&mut self.buffers);
+        saved.map(|saved| (saved.name.as_str(), &mut saved.value))
     }
 
     /// All that a weights file holds: parameters, then buffers.
@@ -216,12 +214,9 @@ pub struct Gradients<T> {
 impl<T: Real> Gradients<T> {
     /// Zeros for every parameter.
     pub fn zeros(parameters: &Parameters<T>) -> Self {
+        let zeros = |(_, value): (_, &ArrayD<T>)| vec![T::zero(); value.len()];
         Self {
-            values: parameters
-                .parameters
-                .iter()
-                .map(|parameter| vec![T::zero(); parameter.value.len()])
-                .collect(),
+            values: parameters.iter().map(zeros).collect(),
         }
     }
 

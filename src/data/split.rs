@@ -29,13 +29,14 @@ pub(super) fn split(
         origin: origin.into(),
         found,
     };
+    let fault = |key, value: String, expected| DataError::Config {
+        key,
+        value,
+        expected,
+    };
     if !(0.0..1.0).contains(&config.validation_share) {
-        let value = config.validation_share.to_string();
-        return Err(DataError::Config {
-            key: "validation_share",
-            value,
-            expected: "a share of at least 0 and below 1",
-        });
+        let (value, expected) = (config.validation_share, "a share of at least 0 and below 1");
+        return Err(fault("validation_share", value.to_string(), expected));
     }
     let (train, test) = match &config.split {
         Split::Dance | Split::UnseenDancers(_) if names.len() != DANCE_TRAIN.0 + DANCE_TEST.0 => {
@@ -62,22 +63,18 @@ pub(super) fn split(
                 .into_iter()
                 .partition(|name| dancers.iter().any(|dancer| dancer_of(name) == dancer));
             if train.is_empty() || test.is_empty() {
-                return Err(DataError::Config {
-                    key: "split.unseen_dancers",
-                    value: format!("{dancers:?}"),
-                    expected: "at least one dancer, and not all of them",
-                });
+                let (value, expected) = (
+                    format!("{dancers:?}"),
+                    "at least one dancer, and not all of them",
+                );
+                return Err(fault("split.unseen_dancers", value, expected));
             }
             (train, test)
         }
         Split::Share(share) => {
             if !(*share > 0.0 && *share < 1.0) {
-                let value = share.to_string();
-                return Err(DataError::Config {
-                    key: "split.share",
-                    value,
-                    expected: "a share above 0 and below 1",
-                });
+                let expected = "a share above 0 and below 1";
+                return Err(fault("split.share", share.to_string(), expected));
             }
             let count = floor(names.len() as f64 * share);
             if count == 0 {
@@ -91,11 +88,7 @@ pub(super) fn split(
             for name in train.iter().chain(test) {
                 if !seen.insert(name) {
                     let expected = "file names that are each in one list, once";
-                    return Err(DataError::Config {
-                        key: "split.list",
-                        value: name.clone(),
-                        expected,
-                    });
+                    return Err(fault("split.list", name.clone(), expected));
                 }
                 if !names.contains(name) {
                     let found = format!("does not have it among its {} clips", names.len());

@@ -34,6 +34,19 @@ impl Pose {
         (positions, rotations)
     }
 
+    /// The pose at a share of the way from this one to `other`: translations linearly, rotations
+    /// along the shorter arc.
+    pub fn towards(&self, other: &Self, share: f64) -> Self {
+        let translations = self.translations.iter().zip(&other.translations);
+        let rotations = self.rotations.iter().zip(&other.rotations);
+        Self {
+            translations: translations.map(|(a, b)| a.lerp(*b, share)).collect(),
+            rotations: rotations
+                .map(|(a, b)| a.slerp(*b, share).normalize())
+                .collect(),
+        }
+    }
+
     /// World position of every joint, `[joints]`, cm.
     pub fn world_positions(&self, skeleton: &Skeleton) -> Vec<DVec3> {
         self.world(skeleton).0
@@ -49,4 +62,12 @@ pub struct Clip {
     /// Seconds from one frame to the next.
     pub frame_time: f64,
     pub poses: Vec<Pose>,
+}
+
+impl Skeleton {
+    /// World positions of the joints in every pose, `[poses][joints]`, cm.
+    pub fn world_positions(&self, poses: &[Pose]) -> Vec<Vec<DVec3>> {
+        let poses = poses.iter();
+        poses.map(|pose| pose.world_positions(self)).collect()
+    }
 }

@@ -87,11 +87,7 @@ pub enum FeatureError {
 /// The clip is on another skeleton or has no frames; a setting is not a positive number.
 pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, FeatureError> {
     check(clip, config)?;
-    let world: Vec<Vec<DVec3>> = clip
-        .poses
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect();
+    let world = clip.skeleton.world_positions(&clip.poses);
     let facing = facing_angles(&world, config.facing_sigma);
     let contacts = contacts(&world, config.contact_threshold);
     let mut features = Array2::zeros((world.len(), FEATURES));
@@ -159,29 +155,20 @@ fn check(clip: &Clip, config: &FeatureConfig) -> Result<(), FeatureError> {
             clip: clip.name.clone(),
         });
     }
-    let settings = [
-        (
-            "contact_threshold",
-            config.contact_threshold,
-            f64::MAX,
-            "a positive number",
-        ),
-        (
-            "facing_sigma",
-            config.facing_sigma,
-            LONGEST_SIGMA,
-            "a number of frames above 0 and at most 10000",
-        ),
-    ];
-    match settings
-        .into_iter()
-        .find(|&(_, value, largest, _)| !(value > 0.0 && value <= largest))
-    {
-        Some((key, value, _, expected)) => Err(FeatureError::Config {
+    let (threshold, sigma) = (config.contact_threshold, config.facing_sigma);
+    let fault = |key, value, expected| {
+        Err(FeatureError::Config {
             key,
             value,
             expected,
-        }),
-        None => Ok(()),
+        })
+    };
+    if !(threshold > 0.0 && threshold.is_finite()) {
+        return fault("contact_threshold", threshold, "a positive number");
     }
+    if !(sigma > 0.0 && sigma <= LONGEST_SIGMA) {
+        let expected = "a number of frames above 0 and at most 10000";
+        return fault("facing_sigma", sigma, expected);
+    }
+    Ok(())
 }

@@ -101,24 +101,19 @@ fn check(
         return Err(RotationFitError::NoFrames);
     }
     let expected = skeleton.len();
-    let keyframes = [("start", Some(start)), ("end", end)];
-    let counts = keyframes.into_iter().flat_map(|(which, pose)| {
-        pose.into_iter().flat_map(move |pose| {
-            [
-                (
-                    format!("the {which} pose's translations"),
-                    pose.translations.len(),
-                ),
-                (
-                    format!("the {which} pose's rotations"),
-                    pose.rotations.len(),
-                ),
-            ]
-        })
-    });
+    let mut counts = Vec::new();
+    for (which, pose) in [("start", Some(start)), ("end", end)] {
+        let Some(pose) = pose else { continue };
+        for (part, count) in [
+            ("translations", pose.translations.len()),
+            ("rotations", pose.rotations.len()),
+        ] {
+            counts.push((format!("the {which} pose's {part}"), count));
+        }
+    }
     let frames = positions.iter().enumerate();
-    let frames = frames.map(|(frame, joints)| (format!("frame {frame}"), joints.as_ref().len()));
-    for (what, found) in counts.chain(frames) {
+    counts.extend(frames.map(|(at, joints)| (format!("frame {at}"), joints.as_ref().len())));
+    for (what, found) in counts {
         if found != expected {
             return Err(RotationFitError::Joints {
                 what,
@@ -217,7 +212,7 @@ impl<'a> Fitter<'a> {
             let propagated = parent * before.rotations[index];
             let between = self.end.map(|end| {
                 let (from, to) = (self.start.rotations[index], end.rotations[index]);
-                parent * slerp(from, to, share)
+                parent * from.slerp(to, share).normalize()
             });
             let turned = match &self.guides[index] {
                 Guide::Leaf => between.unwrap_or(propagated),
@@ -320,11 +315,6 @@ fn swing(rotation: DQuat, bone: DVec3, direction: DVec3) -> DQuat {
 /// What is left of a vector across a direction of any length.
 fn across(vector: DVec3, direction: DVec3) -> DVec3 {
     vector - vector.project_onto_normalized(direction.normalize())
-}
-
-fn slerp(from: DQuat, to: DQuat, share: f64) -> DQuat {
-    let to = if from.dot(to) < 0.0 { -to } else { to };
-    from.slerp(to, share).normalize()
 }
 
 /// Bones to children as `rotation` has them, and as they are wanted; those without a length are

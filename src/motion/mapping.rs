@@ -135,26 +135,20 @@ impl Mapping {
             source: Box::new(source),
         })?;
         let MappingFile { scale, mut joints } = parsed;
+        let fault = |key: String, value: f64, expected| MappingError::Value {
+            file: file.into(),
+            key,
+            value,
+            expected,
+        };
         if !(scale.is_finite() && scale > 0.0) {
-            let expected = "a positive number of cm";
-            return Err(MappingError::Value {
-                file: file.into(),
-                key: "scale".into(),
-                value: scale,
-                expected,
-            });
+            return Err(fault("scale".into(), scale, "a positive number of cm"));
         }
         for (joint, source) in &joints {
             if let Source::Between(Between { at, .. }) = source
                 && !(0.0..=1.0).contains(at)
             {
-                let expected = "a share between 0 and 1";
-                return Err(MappingError::Value {
-                    file: file.into(),
-                    key: format!("{joint}.at"),
-                    value: *at,
-                    expected,
-                });
+                return Err(fault(format!("{joint}.at"), *at, "a share between 0 and 1"));
             }
         }
         let found: Vec<Option<Source>> = DANCE_JOINTS
@@ -167,12 +161,9 @@ impl Mapping {
                 joint,
             });
         }
-        let lacking: Vec<&str> = DANCE_JOINTS
-            .iter()
-            .zip(&found)
-            .filter(|(_, source)| source.is_none())
-            .map(|(name, _)| *name)
-            .collect();
+        let joints = DANCE_JOINTS.into_iter().zip(&found);
+        let lacking = joints.filter_map(|(name, source)| source.is_none().then_some(name));
+        let lacking: Vec<&str> = lacking.collect();
         if !lacking.is_empty() {
             return Err(MappingError::Incomplete {
                 file: file.into(),
@@ -201,13 +192,9 @@ impl Mapping {
             .zip(DANCE_JOINTS)
             .map(|(source, joint)| self.place(source, joint, clip))
             .collect::<Result<_, _>>()?;
+        let joints = clip.skeleton.joints.iter();
         let rest = Pose {
-            translations: clip
-                .skeleton
-                .joints
-                .iter()
-                .map(|joint| joint.offset)
-                .collect(),
+            translations: joints.map(|joint| joint.offset).collect(),
             rotations: vec![DQuat::IDENTITY; clip.skeleton.len()],
         };
         let offsets = self.pose(&places, &rest, &clip.skeleton).translations;
@@ -232,19 +219,15 @@ impl Mapping {
     }
 
     fn place(&self, source: &Source, joint: &str, clip: &Clip) -> Result<Place, MappingError> {
+        let joints = clip.skeleton.joints.iter();
+        let names: Vec<&str> = joints.map(|joint| joint.name.as_str()).collect();
         let anchor = |name: &String| {
             anchor(&clip.skeleton, name).ok_or_else(|| MappingError::NotInClip {
                 file: self.file.clone(),
                 joint: joint.into(),
                 source_name: name.clone(),
                 clip: clip.name.clone(),
-                available: clip
-                    .skeleton
-                    .joints
-                    .iter()
-                    .map(|joint| joint.name.as_str())
-                    .collect::<Vec<_>>()
-                    .join(", "),
+                available: names.join(", "),
             })
         };
         Ok(match source {
@@ -326,10 +309,9 @@ fn anchor(skeleton: &Skeleton, name: &str) -> Option<Anchor> {
         });
     }
     let (joint, end) = name.rsplit_once("/End Site")?;
-    let number = if end.is_empty() {
-        1
-    } else {
-        end.strip_prefix(' ')?.parse::<usize>().ok()?
+    let number = match end {
+        "" => 1,
+        end => end.strip_prefix(' ')?.parse::<usize>().ok()?,
     };
     let joint = skeleton.index_of(joint)?;
     let offset = *skeleton.joints[joint]

@@ -106,18 +106,5 @@ fn pose_at(poses: &[Pose], time: f64) -> Pose {
     if share < 1e-9 || before == last {
         return from.clone();
     }
-    Pose {
-        translations: from
-            .translations
-            .iter()
-            .zip(&to.translations)
-            .map(|(a, b)| a.lerp(*b, share))
-            .collect(),
-        rotations: from
-            .rotations
-            .iter()
-            .zip(&to.rotations)
-            .map(|(a, b)| a.slerp(*b, share).normalize())
-            .collect(),
-    }
+    from.towards(to, share)
 }

@@ -101,27 +101,15 @@ impl Skeleton {
     /// The first place where this is not the dance skeleton: its index, what the dance skeleton has
     /// there, what this one has.
     pub fn difference_from_dance(&self) -> Option<(usize, String, String)> {
+        let name_at = |at: usize| self.joints.get(at).map(|joint| joint.name.as_str());
         (0..self.len().max(JOINTS)).find_map(|index| {
             let expected = DANCE_JOINTS
                 .get(index)
                 .map(|name| describe(name, DANCE_PARENTS[index].map(|at| DANCE_JOINTS[at])));
-            let found = self.joints.get(index).map(|joint| {
-                describe(
-                    &joint.name,
-                    joint
-                        .parent
-                        .and_then(|at| self.joints.get(at))
-                        .map(|parent| parent.name.as_str()),
-                )
-            });
-            let none = || "no further joint".to_string();
-            (expected != found).then(|| {
-                (
-                    index,
-                    expected.unwrap_or_else(none),
-                    found.unwrap_or_else(none),
-                )
-            })
+            let joint = self.joints.get(index);
+            let found = joint.map(|joint| describe(&joint.name, joint.parent.and_then(name_at)));
+            let text = |joint: Option<String>| joint.unwrap_or("no further joint".into());
+            (expected != found).then(|| (index, text(expected), text(found)))
         })
     }
 }

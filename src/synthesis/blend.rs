@@ -38,18 +38,11 @@ pub(super) fn blend(track: &mut Track, start: &Start<'_>, target: &Pose, target_
     let frames = BLEND.min(length);
     let joints = target.rotations.len();
     let first = Decay::new(frames);
-    let root: Vec<DVec3> = track
-        .poses
-        .iter()
-        .map(|pose| pose.translations[0])
-        .collect();
+    let poses = track.poses.iter();
+    let root: Vec<DVec3> = poses.map(|pose| pose.translations[0]).collect();
     let before = start.before.map(|(pose, _)| pose.translations[0]);
-    let offset = Offset::new(
-        &root,
-        start.pose.translations[0],
-        before,
-        target.translations[0],
-    );
+    let (from, to) = (start.pose.translations[0], target.translations[0]);
+    let offset = Offset::new(&root, from, before, to);
     for (index, pose) in track.poses.iter_mut().enumerate() {
         pose.translations[0] += offset.at(&first, index, length);
     }
@@ -57,29 +50,17 @@ pub(super) fn blend(track: &mut Track, start: &Start<'_>, target: &Pose, target_
     let facing = |angle: f64| DVec3::new(angle, 0.0, 0.0);
     let angles: Vec<DVec3> = track.facing.iter().map(|&angle| facing(angle)).collect();
     let last = track.facing[length - 1];
-    let nearest = last + wrap(target_facing - last);
-    let offset = Offset::new(
-        &angles,
-        facing(start.facing),
-        before.map(facing),
-        facing(nearest),
-    );
+    let (from, to) = (start.facing, last + wrap(target_facing - last));
+    let offset = Offset::new(&angles, facing(from), before.map(facing), facing(to));
     for (index, angle) in track.facing.iter_mut().enumerate() {
         *angle += offset.at(&first, index, length).x;
     }
     for joint in 0..joints {
-        let rotations: Vec<DQuat> = track
-            .poses
-            .iter()
-            .map(|pose| pose.rotations[joint])
-            .collect();
+        let poses = track.poses.iter();
+        let rotations: Vec<DQuat> = poses.map(|pose| pose.rotations[joint]).collect();
         let before = start.before.map(|(pose, _)| pose.rotations[joint]);
-        let offset = Offset::turning(
-            &rotations,
-            start.pose.rotations[joint],
-            before,
-            target.rotations[joint],
-        );
+        let (from, to) = (start.pose.rotations[joint], target.rotations[joint]);
+        let offset = Offset::turning(&rotations, from, before, to);
         for (index, pose) in track.poses.iter_mut().enumerate() {
             let turn = DQuat::from_scaled_axis(offset.end_at(&first, index, length))
                 * DQuat::from_scaled_axis(offset.start_at(&first, index));

@@ -69,10 +69,7 @@ pub(super) fn pin_feet(
     keyframes: &[usize],
 ) {
     for leg in &LEGS {
-        let world: Vec<Vec<DVec3>> = poses
-            .iter()
-            .map(|pose| pose.world_positions(skeleton))
-            .collect();
+        let world = skeleton.world_positions(poses);
         let hold = |joint: usize, label: usize| {
             let on: Vec<bool> = contacts.iter().map(|labels| labels[label]).collect();
             let path: Vec<DVec3> = world.iter().map(|world| world[joint]).collect();

@@ -24,4 +24,4 @@ pub use sequence::{
     FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise, trajectory_error,
 };
 pub use summary::Summary;
-pub use warning::{ControlWarning, control_warnings, moved_warnings};
+pub use warning::{ControlWarning, Excess, control_warnings, moved_warnings};

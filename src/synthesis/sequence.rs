@@ -75,17 +75,6 @@ pub struct FootSkate {
     pub after: Option<f64>,
 }
 
-impl Sequence {
-    /// World positions of the joints of `clip`, `[F][24]`, cm.
-    pub fn world_positions(&self) -> Vec<Vec<DVec3>> {
-        self.clip
-            .poses
-            .iter()
-            .map(|pose| pose.world_positions(&self.clip.skeleton))
-            .collect()
-    }
-}
-
 /// How far the root of a sequence is from the trajectory that was asked for, mean and maximum over
 /// its frames, cm.
 pub fn trajectory_error(request: &SequenceRequest, sequence: &Sequence) -> (f64, f64) {
@@ -312,13 +301,7 @@ impl<'r> Made<'r> {
             .collect();
         let fits = &self.fits;
         let skeleton = &self.request.skeleton;
-        let skate = |poses: &[Pose]| {
-            let world: Vec<_> = poses
-                .iter()
-                .map(|pose| pose.world_positions(skeleton))
-                .collect();
-            foot_skate(&world, &contacts)
-        };
+        let skate = |poses: &[Pose]| foot_skate(&skeleton.world_positions(poses), &contacts);
         let keyframes = self.request.times();
         let before = skate(&self.poses);
         if options.foot_cleanup {

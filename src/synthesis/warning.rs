@@ -18,35 +18,30 @@ const TRUNK: usize = 0;
 const TOLERANCE: f64 = 1.2;
 const SLACK: f64 = 0.2;
 
+/// The frames in which a control is out of range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excess {
+    /// The worst of them.
+    pub frame: usize,
+    /// What is asked for there.
+    pub asked: f64,
+    pub bound: f64,
+    /// How many they are.
+    pub frames: usize,
+}
+
 /// A control out of range; its `Display` says by how much.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ControlWarning {
-    RootSpeed {
-        frame: usize,
-        asked: f64,
-        bound: f64,
-        frames: usize,
-    },
-    RootHeight {
-        frame: usize,
-        asked: f64,
-        bound: f64,
-        frames: usize,
-    },
+    RootSpeed(Excess),
+    RootHeight(Excess),
     VelocityFactor {
         part: usize,
-        frame: usize,
-        asked: f64,
-        bound: f64,
-        frames: usize,
+        excess: Excess,
     },
-    /// The trunk's velocity factor counts the root, so the trajectory alone makes it at least this.
-    Contradiction {
-        frame: usize,
-        asked: f64,
-        least: f64,
-        frames: usize,
-    },
+    /// The trunk's velocity factor counts the root, so the trajectory alone makes it at least the
+    /// bound.
+    Contradiction(Excess),
     Length {
         from: usize,
         to: usize,
@@ -61,23 +56,23 @@ pub enum ControlWarning {
 impl fmt::Display for ControlWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::RootSpeed {
+            Self::RootSpeed(Excess {
                 frame,
                 asked,
                 bound,
                 frames,
-            } => write!(
+            }) => write!(
                 f,
                 "the root trajectory goes {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's fastest ({bound:.1} in 99.9 % of \
                  its frames); too fast in {frames} frames",
                 asked / bound
             ),
-            Self::RootHeight {
+            Self::RootHeight(Excess {
                 frame,
                 asked,
                 bound,
                 frames,
-            } => write!(
+            }) => write!(
                 f,
                 "the root trajectory is at {asked:.0} cm height at frame {frame}, {:.0} cm {} the training data's {} ({bound:.0} in 99.9 % of its \
                  frames); so in {frames} frames",
@@ -87,10 +82,13 @@ impl fmt::Display for ControlWarning {
             ),
             Self::VelocityFactor {
                 part,
-                frame,
-                asked,
-                bound,
-                frames,
+                excess:
+                    Excess {
+                        frame,
+                        asked,
+                        bound,
+                        frames,
+                    },
             } => write!(
                 f,
                 "the velocity factor of {} is {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's highest ({bound:.1} in 99.9 % of \
@@ -98,14 +96,14 @@ impl fmt::Display for ControlWarning {
                 PART_NAMES[part],
                 asked / bound
             ),
-            Self::Contradiction {
+            Self::Contradiction(Excess {
                 frame,
                 asked,
-                least,
+                bound,
                 frames,
-            } => write!(
+            }) => write!(
                 f,
-                "the velocity factor of the trunk is {asked:.1} cm/frame at frame {frame}, but the root trajectory alone makes it {least:.1} or \
+                "the velocity factor of the trunk is {asked:.1} cm/frame at frame {frame}, but the root trajectory alone makes it {bound:.1} or \
                  more there; the two contradict each other in {frames} frames"
             ),
             Self::Length { from, to } => write!(
@@ -134,14 +132,12 @@ pub fn control_warnings(
             warnings.push(ControlWarning::Length { from, to });
         }
     }
-    if let Some((frame, _, frames)) = beyond(shortfalls(request), 0.0) {
-        warnings.push(ControlWarning::Contradiction {
-            frame,
-            asked: request.velocity_factors[[frame, TRUNK]],
-            least: least_trunk(request, frame),
-            frames,
-        });
-    }
+    let contradiction = beyond(shortfalls(request), 0.0).map(|excess| Excess {
+        asked: request.velocity_factors[[excess.frame, TRUNK]],
+        bound: least_trunk(request, excess.frame),
+        ..excess
+    });
+    warnings.extend(contradiction.map(ControlWarning::Contradiction));
     let Some(ranges) = ranges else {
         return warnings;
     };
@@ -150,43 +146,21 @@ pub fn control_warnings(
         None => 0.0,
         Some(before) => distance(root.row(before), root.row(frame)),
     });
-    if let Some((frame, asked, frames)) = beyond(speeds, ranges.root_speed) {
-        warnings.push(ControlWarning::RootSpeed {
-            frame,
-            asked,
-            bound: ranges.root_speed,
-            frames,
-        });
-    }
+    warnings.extend(beyond(speeds, ranges.root_speed).map(ControlWarning::RootSpeed));
     let [lowest, highest] = ranges.root_height;
     let heights = root.column(1);
-    if let Some((frame, asked, frames)) = beyond(heights.iter().copied(), highest) {
-        warnings.push(ControlWarning::RootHeight {
-            frame,
-            asked,
-            bound: highest,
-            frames,
-        });
-    }
-    if let Some((frame, depth, frames)) = beyond(heights.iter().map(|height| -height), -lowest) {
-        warnings.push(ControlWarning::RootHeight {
-            frame,
-            asked: -depth,
-            bound: lowest,
-            frames,
-        });
-    }
+    let above = beyond(heights.iter().copied(), highest);
+    let below = beyond(heights.iter().map(|height| -height), -lowest).map(|excess| Excess {
+        asked: -excess.asked,
+        bound: lowest,
+        ..excess
+    });
+    let heights = [above, below].into_iter().flatten();
+    warnings.extend(heights.map(ControlWarning::RootHeight));
     for (part, &bound) in ranges.velocity_factors.iter().enumerate() {
         let factors = request.velocity_factors.column(part);
-        if let Some((frame, asked, frames)) = beyond(factors.iter().copied(), bound) {
-            warnings.push(ControlWarning::VelocityFactor {
-                part,
-                frame,
-                asked,
-                bound,
-                frames,
-            });
-        }
+        let excess = beyond(factors.iter().copied(), bound);
+        warnings.extend(excess.map(|excess| ControlWarning::VelocityFactor { part, excess }));
     }
     warnings
 }
@@ -222,11 +196,16 @@ pub fn moved_warnings(request: &SequenceRequest, moved: &[f64]) -> Vec<ControlWa
         .collect()
 }
 
-/// The largest value beyond a bound, its frame, and how many values are.
-fn beyond(values: impl Iterator<Item = f64>, bound: f64) -> Option<(usize, f64, usize)> {
+/// The values beyond a bound, the largest as what is asked for.
+fn beyond(values: impl Iterator<Item = f64>, bound: f64) -> Option<Excess> {
     let beyond: Vec<(usize, f64)> = values.enumerate().filter(|(_, x)| *x > bound).collect();
-    let largest = beyond.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((largest.0, largest.1, beyond.len()))
+    let &(frame, asked) = beyond.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(Excess {
+        frame,
+        asked,
+        bound,
+        frames: beyond.len(),
+    })
 }
 
 fn distance(a: ArrayView1<f64>, b: ArrayView1<f64>) -> f64 {

@@ -51,10 +51,7 @@ fn read(path: &Path) -> Clip {
 }
 
 fn world(clip: &Clip) -> Vec<Vec<DVec3>> {
-    clip.poses
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect()
+    clip.skeleton.world_positions(&clip.poses)
 }
 
 fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {

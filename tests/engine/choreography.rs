@@ -24,10 +24,7 @@ fn clips(clips: usize, frames_per_clip: usize, seed: u64) -> Vec<GeneratedClip> 
 /// World positions `[frames][joints]`, cm.
 fn positions(generated: &GeneratedClip) -> Vec<Vec<DVec3>> {
     let clip = &generated.clip;
-    clip.poses
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect()
+    clip.skeleton.world_positions(&clip.poses)
 }
 
 /// Every number of a clip, to the bit.

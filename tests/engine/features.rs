@@ -296,10 +296,7 @@ fn the_binary_writes_the_same_numbers_as_float32() {
 /// World positions of the figure turning by the given angles.
 fn turning(angles: &[f64]) -> Vec<Vec<DVec3>> {
     let clip = turning_clip("turning", angles.len(), |t| (HIPS, angles[t]));
-    let world = clip.poses.iter();
-    world
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect()
+    clip.skeleton.world_positions(&clip.poses)
 }
 
 proptest! {

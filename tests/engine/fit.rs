@@ -55,10 +55,7 @@ fn clip(frames: usize, speed: f64) -> Clip {
 }
 
 fn world(clip: &Clip) -> Vec<Vec<DVec3>> {
-    clip.poses
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect()
+    clip.skeleton.world_positions(&clip.poses)
 }
 
 proptest! {

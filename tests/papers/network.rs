@@ -3,11 +3,22 @@
 use keydance::autograd::{Parameters, Real, Tape, Workspace};
 use keydance::models::pan2021::{Output, Pan2021, Pan2021Config};
 use keydance::models::transition::Standardisation;
+use keydance::models::transition::gradient_check::generated_batch;
 use keydance::models::transition::{Batch, Network};
 use keydance::nn::Initialiser;
 use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+/// Features of generated windows alone, standardised `[transition + 1, windows, 154]`.
+pub fn generated_windows(
+    transition: usize,
+    windows: usize,
+    seed: u64,
+) -> (Array3<f64>, Standardisation) {
+    let (batch, standardisation) = generated_batch(transition, windows, seed).unwrap();
+    (batch.features, standardisation)
+}
 
 pub fn residual() -> Pan2021Config {
     Pan2021Config {

@@ -8,7 +8,7 @@ use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
-use keydance::models::transition::gradient_check::{GradientCase, check_model, generated_windows};
+use keydance::models::transition::gradient_check::{GradientCase, check_model};
 use keydance::models::transition::{Batch, Feed, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
@@ -16,7 +16,7 @@ use ndarray::{Array3, Axis, s};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::network::{Built, build, predict, residual, with_control_path};
+use crate::network::{Built, build, generated_windows, predict, residual, with_control_path};
 
 type Shapes = BTreeMap<String, Vec<usize>>;
 
@@ -294,7 +294,7 @@ fn without_key_loss_only_the_total_changes() {
 
 /// Terms and total on two windows of 12 frames, without dropout.
 fn losses(config: &Pan2021Config, feed: Feed) -> BTreeMap<&'static str, f64> {
-    let (features, standardisation) = generated_windows(12, 2, 5).unwrap();
+    let (features, standardisation) = generated_windows(12, 2, 5);
     let built: Built<f64> = build(config, &standardisation);
     let mut workspace = Workspace::new();
     let mut tape = Tape::recording(&built.parameters, &mut workspace);
@@ -424,7 +424,7 @@ fn largest_difference(a: &Array3<f64>, b: &Array3<f64>) -> f64 {
 fn windows_predicted_together_are_those_predicted_one_by_one() {
     // 40 windows are more than a controller codes at once, 3 fewer.
     for (windows, chunk) in [(5, 1), (5, 3), (40, 40), (40, 3)] {
-        let (features, standardisation) = generated_windows(9, windows, 11).unwrap();
+        let (features, standardisation) = generated_windows(9, windows, 11);
         for config in networks() {
             let built: Built<f64> = build(&config, &standardisation).disturbed();
             let together = predict(&built, &features);
@@ -441,7 +441,7 @@ fn windows_predicted_together_are_those_predicted_one_by_one() {
 
 #[test]
 fn a_prediction_reads_only_what_is_given() {
-    let (features, standardisation) = generated_windows(9, 3, 13).unwrap();
+    let (features, standardisation) = generated_windows(9, 3, 13);
     for config in networks() {
         let built: Built<f64> = build(&config, &standardisation).disturbed();
         let before = predict(&built, &features);
@@ -458,7 +458,7 @@ fn a_prediction_reads_only_what_is_given() {
 
 #[test]
 fn a_prediction_follows_everything_that_is_given() {
-    let (features, standardisation) = generated_windows(9, 3, 13).unwrap();
+    let (features, standardisation) = generated_windows(9, 3, 13);
     for config in networks() {
         let built: Built<f64> = build(&config, &standardisation).disturbed();
         let before = predict(&built, &features);
@@ -490,7 +490,7 @@ fn a_prediction_follows_everything_that_is_given() {
 
 #[test]
 fn predictions_are_the_frames_whose_losses_training_takes() {
-    let (features, standardisation) = generated_windows(12, 3, 17).unwrap();
+    let (features, standardisation) = generated_windows(12, 3, 17);
     for config in networks() {
         let built: Built<f64> = build(&config, &standardisation).disturbed();
         let predicted = predict(&built, &features);
@@ -535,7 +535,7 @@ fn gradients_of(built: &Built<f64>, batches: &[Batch<f64>], feed: Feed) -> (f64,
 
 #[test]
 fn shards_on_tapes_of_their_own_add_up_to_the_batch() {
-    let (features, standardisation) = generated_windows(7, 5, 19).unwrap();
+    let (features, standardisation) = generated_windows(7, 5, 19);
     let built: Built<f64> = build(&whole_model().small(), &standardisation);
     let shard = |windows: std::ops::Range<usize>| Batch {
         features: features
@@ -559,7 +559,7 @@ fn shards_on_tapes_of_their_own_add_up_to_the_batch() {
 
 #[test]
 fn features_of_another_shape_are_refused_with_their_shape() {
-    let (_, standardisation) = generated_windows(3, 1, 1).unwrap();
+    let (_, standardisation) = generated_windows(3, 1, 1);
     let built: Built<f64> = build(&whole_model().small(), &standardisation);
     let mut workspace = Workspace::new();
     for shape in [(1, 2, FEATURES), (4, 2, FRAME)] {
@@ -593,7 +593,7 @@ fn reads(built: &Built<f64>, features: &Array3<f64>, row: usize, column: usize) 
 
 #[test]
 fn each_code_enters_the_lstms_at_its_own_place() {
-    let (features, standardisation) = generated_windows(9, 2, 13).unwrap();
+    let (features, standardisation) = generated_windows(9, 2, 13);
     // Codes are 8 wide here: state, velocity, root trajectory, velocity factor; the target's beside
     // the first LSTM's output.
     let (one, two) = ("lstm.weight_ih_l0", "lstm2.weight_ih_l0");
@@ -631,7 +631,7 @@ fn each_code_enters_the_lstms_at_its_own_place() {
 
 #[test]
 fn each_output_of_the_decoders_is_its_number_of_the_frame() {
-    let (features, standardisation) = generated_windows(1, 2, 13).unwrap();
+    let (features, standardisation) = generated_windows(1, 2, 13);
     let (state, root) = ("state_decoder.4.bias", "root_decoder.4.bias");
     for (config, bias, output, number) in [
         (whole_model(), state, 68, 68),

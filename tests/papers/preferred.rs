@@ -9,7 +9,6 @@ use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::evaluation::equations::window_request;
 use keydance::models::pan2021::Pan2021Config;
 use keydance::models::transition::DanceClip;
-use keydance::models::transition::gradient_check::generated_windows;
 use keydance::models::transition::{
     Batch, Feed, Network, SingleFrame, TrainedModel, Transition, TransitionModel, TransitionRequest,
 };
@@ -17,7 +16,7 @@ use keydance::models::transition::{RootFrame, Standardisation, window_features};
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array2, ArrayD, ArrayView1, Axis, s};
 
-use crate::network::{Built, build, predict, residual, with_control_path};
+use crate::network::{Built, build, generated_windows, predict, residual, with_control_path};
 
 /// Weights of p^b and v^b of k1 and p^b of k2 in the linear estimate of frame t with the least
 /// expected square error, where numbers d frames apart correlate by r(d) of `docs/pan2021.md`.
@@ -45,7 +44,7 @@ fn kriging(t: usize, n: usize) -> ([f64; 3], f64) {
 
 #[test]
 fn an_untrained_residual_network_is_the_best_linear_estimate_on_the_given_trajectory() {
-    let (features, statistics) = generated_windows(8, 2, 13).unwrap();
+    let (features, statistics) = generated_windows(8, 2, 13);
     let std = &statistics.std;
     // From a velocity of p^b or p^r, standardised, to deviations of the position a frame, and back.
     let speed =
@@ -241,7 +240,7 @@ const SEEN: usize = ESTIMATE + 3 * 69;
 #[test]
 fn the_control_path_adds_what_it_sees_as_documented() {
     let (n, windows) = (30, 2);
-    let (features, statistics) = generated_windows(n, windows, 13).unwrap();
+    let (features, statistics) = generated_windows(n, windows, 13);
     let std = &statistics.std;
     let config = with_control_path().small();
     let plain = predict(&build(&config, &statistics), &features);
@@ -337,7 +336,7 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
     let config = with_control_path().small();
     let mut single_frames = Vec::new();
     let mut expected = 0.0;
-    let (features, statistics) = generated_windows(9, 2, 13).unwrap();
+    let (features, statistics) = generated_windows(9, 2, 13);
     let mut built: Built<f64> = build(&config, &statistics).disturbed();
     for (name, value) in built.parameters.values_mut() {
         // The path alone: whatever the decoders would add is 0.
@@ -346,7 +345,7 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
         }
     }
     for (n, frame) in [(2, 1), (30, 12), (41, 41)] {
-        let (window, _) = generated_windows(n, 1, n as u64).unwrap();
+        let (window, _) = generated_windows(n, 1, n as u64);
         let predicted = predict(&built, &window);
         let missed = &predicted.slice(s![frame - 1, 0, ..69]) - &window.slice(s![frame, 0, ..69]);
         let scaled = missed
@@ -391,7 +390,7 @@ fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_
         control_path_members: 3,
         ..member.clone()
     };
-    let (features, statistics) = generated_windows(9, 2, 13).unwrap();
+    let (features, statistics) = generated_windows(9, 2, 13);
     let mut together: Built<f64> = build(&ensemble, &statistics).disturbed();
     for (name, value) in together.parameters.values_mut() {
         // The paths alone: whatever the decoders would add is 0.
@@ -401,7 +400,7 @@ fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_
     }
     let single_frames = || {
         [(30, 12), (7, 7)].map(|(n, frame)| SingleFrame {
-            window: generated_windows(n, 1, n as u64).unwrap().0,
+            window: generated_windows(n, 1, n as u64).0,
             frame,
         })
     };
@@ -448,7 +447,7 @@ fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_
 
 #[test]
 fn the_control_path_sees_controls_twenty_frames_ahead_that_the_controllers_do_not() {
-    let (features, statistics) = generated_windows(40, 1, 13).unwrap();
+    let (features, statistics) = generated_windows(40, 1, 13);
     let mut changed = features.clone();
     changed[[30, 0, 150]] += 1.0;
     let first_changed = |config: &Pan2021Config| {

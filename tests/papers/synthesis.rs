@@ -121,11 +121,13 @@ const PLAIN: SynthesisOptions = SynthesisOptions {
     foot_cleanup: false,
 };
 
+fn world(sequence: &Sequence) -> Vec<Vec<DVec3>> {
+    let clip = &sequence.clip;
+    clip.skeleton.world_positions(&clip.poses)
+}
+
 fn positions(clip: &DanceClip) -> Vec<Vec<DVec3>> {
-    let poses = clip.clip.poses.iter();
-    poses
-        .map(|pose| pose.world_positions(&clip.clip.skeleton))
-        .collect()
+    clip.clip.skeleton.world_positions(&clip.clip.poses)
 }
 
 /// Length of the second difference of every joint's position around a frame, cm/frame^2.
@@ -143,7 +145,7 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 fn assert_at_keyframes(sequence: &Sequence, request: &SequenceRequest) {
-    let world = sequence.world_positions();
+    let world = world(&sequence);
     for timed in &request.keyframes {
         let wanted = timed.keyframe.pose.world_positions(&request.skeleton);
         for (found, wanted) in world[timed.time].iter().zip(wanted) {
@@ -162,7 +164,7 @@ fn a_model_that_misses_is_bent_onto_every_keyframe_without_a_jump() {
     assert_eq!(sequence.keyframes, [0, 60, 110, 180]);
     assert_at_keyframes(&sequence, &request);
     let recorded = positions(&clip);
-    let world = sequence.world_positions();
+    let world = world(&sequence);
     for (time, frame) in sequence.keyframes.iter().zip(frames) {
         for (found, recorded) in world[*time].iter().zip(&recorded[frame]) {
             assert!(found.distance(*recorded) < 0.01);
@@ -202,7 +204,7 @@ fn bones_keep_their_lengths_in_every_frame() {
     let request = SequenceRequest::from_clip(&clip, &[0, 60, 140]).unwrap();
     let options = SynthesisOptions { foot_cleanup: true };
     let sequence = synthesise(&Astray::default(), &request, &options, "dance").unwrap();
-    for positions in sequence.world_positions() {
+    for positions in world(&sequence) {
         for (index, joint) in clip.clip.skeleton.joints.iter().enumerate() {
             if let Some(parent) = joint.parent {
                 let length = positions[index].distance(positions[parent]);
@@ -342,7 +344,7 @@ fn feet_in_contact_are_pinned_and_keyframes_stay() {
     assert!(before > 0.5 && after < 0.3 * before, "{before} {after}");
     assert_at_keyframes(&pinned, &request);
     // The correction comes and goes smoothly: nothing jumps that did not before.
-    let (plain, pinned) = (plain.world_positions(), pinned.world_positions());
+    let (plain, pinned) = (world(&plain), world(&pinned));
     for frame in 1..pinned.len() - 1 {
         let worst = largest(&accelerations(&pinned, frame));
         let bound = largest(&accelerations(&plain, frame)) + 4.0;
@@ -429,9 +431,7 @@ fn a_turned_request_gives_the_same_dance_turned() {
     let straight = SequenceRequest::from_clip(&clip, &[10, 120]).unwrap();
     let turned = straight.clone().turned(FRAC_PI_2);
     let [a, b] = [&straight, &turned].map(|request| {
-        synthesise(&Interpolation::default(), request, &PLAIN, "dance")
-            .unwrap()
-            .world_positions()
+        world(&synthesise(&Interpolation::default(), request, &PLAIN, "dance").unwrap())
     });
     let centre = a[0][0];
     for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {

@@ -146,14 +146,24 @@ fn gradients_of_parameters(case: &Case) -> Vec<Vec<f64>> {
     gradients.iter().map(<[f64]>::to_vec).collect()
 }
 
+/// Cases that follow from what is drawn and a seed.
+pub fn drawn<D: fmt::Debug>(
+    drawn: impl Strategy<Value = D> + 'static,
+    make: impl Fn(D, u64) -> Case + 'static,
+) -> Cases {
+    (drawn, any::<u64>())
+        .prop_map(move |(drawn, seed)| make(drawn, seed))
+        .boxed()
+}
+
 /// Cases of an operation on one value, whose numbers keep `margin` from 0.
 pub fn of_one_value<F>(margin: f64, build: F) -> Cases
 where
     F: Fn(&mut Tape<f64>, Var) -> Result<Var, AutogradError> + Copy + Send + Sync + 'static,
 {
-    (shapes(), any::<u64>())
-        .prop_map(move |(x, seed)| case(&[&x], seed, margin, move |tape, v| build(tape, v[0])))
-        .boxed()
+    drawn(shapes(), move |x, seed| {
+        case(&[&x], seed, margin, move |tape, v| build(tape, v[0]))
+    })
 }
 
 /// Cases of an operation on two values that broadcast together.
@@ -161,11 +171,9 @@ pub fn of_two_values<F>(build: F) -> Cases
 where
     F: Fn(&mut Tape<f64>, Var, Var) -> Result<Var, AutogradError> + Copy + Send + Sync + 'static,
 {
-    (broadcast_shapes(), any::<u64>())
-        .prop_map(move |((a, b), seed)| {
-            case(&[&a, &b], seed, 0.0, move |tape, v| build(tape, v[0], v[1]))
-        })
-        .boxed()
+    drawn(broadcast_shapes(), move |(a, b), seed| {
+        case(&[&a, &b], seed, 0.0, move |tape, v| build(tape, v[0], v[1]))
+    })
 }
 
 /// Two shapes that broadcast together (numpy's rules), of up to three axes of up to three, zero

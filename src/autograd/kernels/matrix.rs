@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-/// A matrix to read: row-major, columns adjacent.
+/// A row-major matrix in a slice, columns adjacent: a [`Mat`] or a [`MatMut`].
 #[derive(Clone, Copy, Debug)]
-pub struct Mat<'a, T> {
+pub struct Matrix<S> {
     /// The numbers; element `(i, j)` at `i * stride + j`.
-    pub data: &'a [T],
+    pub data: S,
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
@@ -15,17 +15,41 @@ pub struct Mat<'a, T> {
     pub stride: usize,
 }
 
-/// A matrix to write: row-major, columns adjacent.
-#[derive(Debug)]
-pub struct MatMut<'a, T> {
-    /// The numbers; element `(i, j)` at `i * stride + j`.
-    pub data: &'a mut [T],
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub cols: usize,
-    /// Distance between the starts of two adjacent rows, at least `cols`.
-    pub stride: usize,
+/// A matrix to read.
+pub type Mat<'a, T> = Matrix<&'a [T]>;
+/// A matrix to write.
+pub type MatMut<'a, T> = Matrix<&'a mut [T]>;
+
+/// A slice, to read or to write.
+pub trait Numbers {
+    fn count(&self) -> usize;
+
+    /// The numbers from `start` on, none beyond the last.
+    fn from(self, start: usize) -> Self;
+}
+
+impl<T> Numbers for &[T] {
+    #[inline]
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    #[inline]
+    fn from(self, start: usize) -> Self {
+        self.get(start..).unwrap_or_default()
+    }
+}
+
+impl<T> Numbers for &mut [T] {
+    #[inline]
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    #[inline]
+    fn from(self, start: usize) -> Self {
+        self.get_mut(start..).unwrap_or_default()
+    }
 }
 
 /// Panics unless `rows` rows of `cols` numbers, `stride` apart, lie within `len` numbers.
@@ -48,14 +72,14 @@ fn check(len: usize, rows: usize, cols: usize, stride: usize) {
     );
 }
 
-impl<'a, T> Mat<'a, T> {
+impl<S: Numbers> Matrix<S> {
     /// A matrix without gaps between its rows.
     ///
     /// # Panics
     /// When `data` holds fewer than `rows * cols` numbers.
     #[inline]
     #[track_caller]
-    pub fn new(data: &'a [T], rows: usize, cols: usize) -> Self {
+    pub fn new(data: S, rows: usize, cols: usize) -> Self {
         Self::strided(data, rows, cols, cols)
     }
 
@@ -65,14 +89,14 @@ impl<'a, T> Mat<'a, T> {
     /// When the rows overlap or do not lie within `data`.
     #[inline]
     #[track_caller]
-    pub fn strided(data: &'a [T], rows: usize, cols: usize, stride: usize) -> Self {
-        check(data.len(), rows, cols, stride);
-        Self {
+    pub fn strided(data: S, rows: usize, cols: usize, stride: usize) -> Self {
+        let matrix = Self {
             data,
             rows,
             cols,
             stride,
-        }
+        };
+        matrix.checked()
     }
 
     /// A range of the columns.
@@ -84,7 +108,7 @@ impl<'a, T> Mat<'a, T> {
     pub fn columns(self, range: Range<usize>) -> Self {
         assert!(range.end <= self.cols, "columns {range:?} of {}", self.cols);
         Self {
-            data: self.data.get(range.start..).unwrap_or_default(),
+            data: self.data.from(range.start),
             cols: range.len(),
             ..self
         }
@@ -94,58 +118,7 @@ impl<'a, T> Mat<'a, T> {
     #[inline]
     #[track_caller]
     pub(super) fn checked(self) -> Self {
-        check(self.data.len(), self.rows, self.cols, self.stride);
-        self
-    }
-}
-
-impl<'a, T> MatMut<'a, T> {
-    /// A matrix without gaps between its rows.
-    ///
-    /// # Panics
-    /// When `data` holds fewer than `rows * cols` numbers.
-    #[inline]
-    #[track_caller]
-    pub fn new(data: &'a mut [T], rows: usize, cols: usize) -> Self {
-        Self::strided(data, rows, cols, cols)
-    }
-
-    /// A matrix whose rows start `stride` numbers apart.
-    ///
-    /// # Panics
-    /// When the rows overlap or do not lie within `data`.
-    #[inline]
-    #[track_caller]
-    pub fn strided(data: &'a mut [T], rows: usize, cols: usize, stride: usize) -> Self {
-        check(data.len(), rows, cols, stride);
-        Self {
-            data,
-            rows,
-            cols,
-            stride,
-        }
-    }
-
-    /// A range of the columns.
-    ///
-    /// # Panics
-    /// When the range goes beyond the columns.
-    #[inline]
-    #[track_caller]
-    pub fn columns(self, range: Range<usize>) -> Self {
-        assert!(range.end <= self.cols, "columns {range:?} of {}", self.cols);
-        Self {
-            data: self.data.get_mut(range.start..).unwrap_or_default(),
-            cols: range.len(),
-            ..self
-        }
-    }
-
-    /// Checks the shape again: the fields are open, and kernels rely on it.
-    #[inline]
-    #[track_caller]
-    pub(super) fn checked(self) -> Self {
-        check(self.data.len(), self.rows, self.cols, self.stride);
+        check(self.data.count(), self.rows, self.cols, self.stride);
         self
     }
 }

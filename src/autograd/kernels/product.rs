@@ -13,13 +13,8 @@ use super::{Isa, Mat, MatMut, Packed, Real, matrix::Operand};
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    product_on(
-        Isa::detected(),
-        Operand::new(a),
-        Operand::new(b),
-        c,
-        accumulate,
-    );
+    let (a, b) = (Operand::new(a), Operand::new(b));
+    product_on(Isa::detected(), a, b, c, accumulate);
 }
 
 /// C = A B^T, or C += A B^T with `accumulate`; A `[m, k]`, B `[n, k]`, C `[m, n]`.
@@ -28,13 +23,8 @@ pub fn product<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product_bt<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    product_on(
-        Isa::detected(),
-        Operand::new(a),
-        Operand::transpose(b),
-        c,
-        accumulate,
-    );
+    let (a, b) = (Operand::new(a), Operand::transpose(b));
+    product_on(Isa::detected(), a, b, c, accumulate);
 }
 
 /// C = A^T B, or C += A^T B with `accumulate`; A `[k, m]`, B `[k, n]`, C `[m, n]`.
@@ -43,13 +33,8 @@ pub fn product_bt<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool)
 /// When the shapes do not fit each other.
 #[track_caller]
 pub fn product_at<T: Real>(a: Mat<T>, b: Mat<T>, c: MatMut<T>, accumulate: bool) {
-    product_on(
-        Isa::detected(),
-        Operand::transpose(a),
-        Operand::new(b),
-        c,
-        accumulate,
-    );
+    let (a, b) = (Operand::transpose(a), Operand::new(b));
+    product_on(Isa::detected(), a, b, c, accumulate);
 }
 
 /// C = A B, or C += A B with `accumulate`; A `[m, k]`, B `[k, n]` packed, C `[m, n]`.

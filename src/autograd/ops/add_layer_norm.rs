@@ -28,25 +28,18 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     /// With and without dropout, and with one value as both summands.
     pub fn cases() -> Cases {
-        (
-            0usize..4,
-            2usize..9,
-            any::<bool>(),
-            any::<bool>(),
-            any::<u64>(),
-        )
-            .prop_map(|(rows, n, dropout, same, seed)| {
-                let shapes: [&[usize]; 4] = [&[rows, n], &[rows, n], &[n], &[n]];
-                case(&shapes, seed, 0.3, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    let residual = if same { v[0] } else { v[1] };
-                    tape.add_layer_norm(v[0], residual, (v[2], v[3]), 0.3)
-                })
+        let inputs = (0usize..4, 2usize..9, any::<[bool; 2]>());
+        drawn(inputs, |(rows, n, [dropout, same]), seed| {
+            let shapes: [&[usize]; 4] = [&[rows, n], &[rows, n], &[n], &[n]];
+            case(&shapes, seed, 0.3, move |tape, v| {
+                tape.set_dropout(dropout.then_some(seed));
+                let residual = if same { v[0] } else { v[1] };
+                tape.add_layer_norm(v[0], residual, (v[2], v[3]), 0.3)
             })
-            .boxed()
+        })
     }
 }

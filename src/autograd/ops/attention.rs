@@ -308,7 +308,7 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::{AttentionShape, HeadColumns};
-    use crate::autograd::check::property::{Cases, case, strength};
+    use crate::autograd::check::property::{Cases, case, drawn, strength};
 
     /// Self-attention with Q, K, V in one value, and attention between two values; with and without
     /// dropout; without a bias and with one for all heads or for each; more keys than a padded
@@ -316,41 +316,37 @@ pub(super) mod gradient {
     pub fn cases() -> Cases {
         let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11);
         let biases = prop_oneof![Just(None), Just(Some(1)), Just(Some(2))];
-        (sizes, biases, any::<bool>(), strength(), any::<u64>())
-            .prop_map(|(sizes, biases, dropout, strength, seed)| {
-                let (windows, heads, head_width, queries, keys) = sizes;
-                let width = heads * head_width;
-                let shapes: [&[usize]; 3] = [
-                    &[windows * queries, 3 * width],
-                    &[windows * keys, 2 * width],
-                    &[
-                        biases.map_or(1, |most: usize| most.min(heads)),
-                        queries,
-                        keys,
-                    ],
-                ];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    let asking = tape.affine(v[0], strength, 0.0);
-                    let columns = |value, k: usize| HeadColumns {
-                        value,
-                        start: k * width,
-                    };
-                    let mut shape = AttentionShape {
-                        heads,
-                        width,
-                        queries,
-                        keys: queries,
-                    };
-                    let (q, k, w) = (columns(asking, 0), columns(v[0], 1), columns(v[0], 2));
-                    let own = tape.attention([q, k, w], shape, None, 0.3)?;
-                    shape.keys = keys;
-                    let (k, w) = (columns(v[1], 0), columns(v[1], 1));
-                    let bias = biases.map(|_| v[2]);
-                    let other = tape.attention([q, k, w], shape, bias, 0.3)?;
-                    tape.add(own, other)
-                })
+        let inputs = (sizes, biases, any::<bool>(), strength());
+        drawn(inputs, |(sizes, biases, dropout, strength), seed| {
+            let (windows, heads, head_width, queries, keys) = sizes;
+            let width = heads * head_width;
+            let biased = biases.map_or(1, |most: usize| most.min(heads));
+            let shapes: [&[usize]; 3] = [
+                &[windows * queries, 3 * width],
+                &[windows * keys, 2 * width],
+                &[biased, queries, keys],
+            ];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                tape.set_dropout(dropout.then_some(seed));
+                let asking = tape.affine(v[0], strength, 0.0);
+                let columns = |value, k: usize| HeadColumns {
+                    value,
+                    start: k * width,
+                };
+                let mut shape = AttentionShape {
+                    heads,
+                    width,
+                    queries,
+                    keys: queries,
+                };
+                let (q, k, w) = (columns(asking, 0), columns(v[0], 1), columns(v[0], 2));
+                let own = tape.attention([q, k, w], shape, None, 0.3)?;
+                shape.keys = keys;
+                let (k, w) = (columns(v[1], 0), columns(v[1], 1));
+                let bias = biases.map(|_| v[2]);
+                let other = tape.attention([q, k, w], shape, bias, 0.3)?;
+                tape.add(own, other)
             })
-            .boxed()
+        })
     }
 }

@@ -40,17 +40,15 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case, shapes};
+    use crate::autograd::check::property::{Cases, case, drawn, shapes};
 
     /// The interval's edges lie at 0 and beyond the drawn numbers, which keep a margin from 0.
     pub fn cases() -> Cases {
-        (shapes(), any::<bool>(), any::<u64>())
-            .prop_map(|(x, below, seed)| {
-                let (low, high) = if below { (-3.0, 0.0) } else { (0.0, 3.0) };
-                case(&[&x], seed, 0.01, move |tape, v| {
-                    Ok(tape.clamp(v[0], low, high))
-                })
+        drawn((shapes(), any::<bool>()), |(x, below), seed| {
+            let (low, high) = if below { (-3.0, 0.0) } else { (0.0, 3.0) };
+            case(&[&x], seed, 0.01, move |tape, v| {
+                Ok(tape.clamp(v[0], low, high))
             })
-            .boxed()
+        })
     }
 }

@@ -14,6 +14,8 @@
 use super::{argument_error, shapes_error};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
+const NAME: &str = "forward_kinematics";
+
 type Vector<T> = [T; 3];
 type Quaternion<T> = [T; 4];
 
@@ -49,10 +51,8 @@ impl<T: Real> Operation<T> for ForwardKinematics<T> {
                         let above: Quaternion<T> = at(world, parent);
                         let offset: Vector<T> = at(&offsets[body..], joint);
                         add(&mut dp[3 * parent..], g);
-                        add(
-                            &mut dworld[4 * parent..],
-                            rotation_gradient(above, offset, g),
-                        );
+                        let turned = rotation_gradient(above, offset, g);
+                        add(&mut dworld[4 * parent..], turned);
                         let own: Quaternion<T> = at(local, joint);
                         add(&mut dworld[4 * parent..], product(dq, conjugate(own)));
                         (rotate(conjugate(above), g), product(conjugate(above), dq))
@@ -95,15 +95,9 @@ impl<T: Real> Tape<'_, T> {
         let joints = parents.len();
         let before = |(joint, parent): (usize, &Option<usize>)| parent.is_none_or(|p| p < joint);
         if joints == 0 || !parents.iter().enumerate().all(before) {
-            let argument = format!("parents {parents:?}");
+            let (shape, argument) = (self.shape(rotations), format!("parents {parents:?}"));
             let expected = "at least one joint, each after its parent";
-            let shape = self.shape(rotations);
-            return Err(argument_error(
-                "forward_kinematics",
-                shape,
-                argument,
-                expected,
-            ));
+            return Err(argument_error(NAME, shape, argument, expected));
         }
         let (left, right) = (self.shape(rotations), self.shape(offsets));
         let (rows, bodies) = match (left, right) {
@@ -116,7 +110,7 @@ impl<T: Real> Tape<'_, T> {
             }
             _ => {
                 let expected = "rotations [n * bodies, 4 J] and offsets [bodies, 3 J]";
-                return Err(shapes_error("forward_kinematics", left, right, expected));
+                return Err(shapes_error(NAME, left, right, expected));
             }
         };
         let mut positions = self.take(rows * 3 * joints);
@@ -144,23 +138,17 @@ impl<T: Real> Tape<'_, T> {
             }
         }
         // Without a gradient to take the operation is not kept.
-        if ![rotations, offsets]
-            .iter()
-            .any(|&input| self.needs_gradient(input))
-        {
+        if !self.needs_gradient(rotations) && !self.needs_gradient(offsets) {
             self.give(std::mem::take(&mut world));
         }
         let (inputs, shape) = ([rotations, offsets], [rows, 3 * joints]);
-        Ok(
-            self.record("forward_kinematics", &inputs, &shape, positions, || {
-                ForwardKinematics {
-                    rotations,
-                    offsets,
-                    parents: parents.to_vec(),
-                    world,
-                }
-            }),
-        )
+        let operation = || ForwardKinematics {
+            rotations,
+            offsets,
+            parents: parents.to_vec(),
+            world,
+        };
+        Ok(self.record(NAME, &inputs, &shape, positions, operation))
     }
 }
 
@@ -230,26 +218,25 @@ fn rotation_gradient<T: Real>(
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     /// Trees of drawn parents, two roots among them, on quaternions that need not have length 1.
     pub fn cases() -> Cases {
         let parents = prop::collection::vec(any::<Option<prop::sample::Index>>(), 1..5);
-        (parents, 0usize..3, 1usize..3, any::<u64>())
-            .prop_map(|(drawn, frames, bodies, seed)| {
-                let parents: Vec<Option<usize>> = drawn
-                    .iter()
-                    .enumerate()
-                    .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
-                    .collect();
-                let joints = parents.len();
-                let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
-                    // Deep trees of long quaternions grow large.
-                    Ok(tape.affine(positions, 0.01, 0.0))
-                })
+        let inputs = (parents, 0usize..3, 1usize..3);
+        drawn(inputs, |(drawn, frames, bodies), seed| {
+            let parents: Vec<Option<usize>> = drawn
+                .iter()
+                .enumerate()
+                .map(|(joint, parent)| parent.filter(|_| joint > 0).map(|p| p.index(joint)))
+                .collect();
+            let joints = parents.len();
+            let shapes: [&[usize]; 2] = [&[frames * bodies, 4 * joints], &[bodies, 3 * joints]];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
+                // Deep trees of long quaternions grow large.
+                Ok(tape.affine(positions, 0.01, 0.0))
             })
-            .boxed()
+        })
     }
 }

@@ -133,10 +133,8 @@ pub(super) fn layer_norm<T: Real>(
         vectorised(
             #[inline(always)]
             || {
-                for (z, statistics) in y
-                    .chunks_exact_mut(columns)
-                    .zip(statistics.chunks_exact_mut(2))
-                {
+                let rows = y.chunks_exact_mut(columns);
+                for (z, statistics) in rows.zip(statistics.chunks_exact_mut(2)) {
                     let (z, g, b) = (&mut z[..columns], &g[..columns], &b[..columns]);
                     let mean = sum_with(columns, |j| z[j]) * scale;
                     let variance = sum_with(columns, |j| (z[j] - mean) * (z[j] - mean)) * scale;
@@ -178,17 +176,13 @@ impl<T: Real> Tape<'_, T> {
 
 #[cfg(test)]
 pub(super) mod gradient {
-    use proptest::prelude::*;
-
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     pub fn cases() -> Cases {
-        (0usize..4, 2usize..9, any::<u64>())
-            .prop_map(|(rows, n, seed)| {
-                case(&[&[rows, n], &[n], &[n]], seed, 0.3, |tape, v| {
-                    tape.layer_norm(v[0], v[1], v[2])
-                })
+        drawn((0usize..4, 2usize..9), |(rows, n), seed| {
+            case(&[&[rows, n], &[n], &[n]], seed, 0.3, |tape, v| {
+                tape.layer_norm(v[0], v[1], v[2])
             })
-            .boxed()
+        })
     }
 }

@@ -153,34 +153,23 @@ fn add_bias<T: Real>(y: &mut [T], bias: Option<&[T]>, outputs: usize, relu: bool
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     /// The layer is applied twice, so that its weight's gradient adds up.
     pub fn cases() -> Cases {
-        (
-            0usize..4,
-            0usize..4,
-            0usize..4,
-            any::<bool>(),
-            any::<bool>(),
-            any::<u64>(),
-        )
-            .prop_map(|(rows, inputs, outputs, bias, relu, seed)| {
-                let shapes: [&[usize]; 4] = [
-                    &[rows, inputs],
-                    &[2, 1, inputs],
-                    &[outputs, inputs],
-                    &[outputs],
-                ];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    let bias = bias.then_some(v[3]);
-                    let first = tape.linear(v[0], v[2], bias, relu)?;
-                    let second = tape.linear(v[1], v[2], bias, relu)?;
-                    let second = tape.reshape(second, &[2, outputs])?;
-                    let (a, b) = (tape.sum(first), tape.square(second));
-                    tape.add(a, b)
-                })
+        let sizes = [0usize..4, 0..4, 0..4];
+        let inputs = (sizes, any::<[bool; 2]>());
+        drawn(inputs, |([rows, inputs, outputs], [bias, relu]), seed| {
+            let (x, more): (&[usize], &[usize]) = (&[rows, inputs], &[2, 1, inputs]);
+            let shapes: [&[usize]; 4] = [x, more, &[outputs, inputs], &[outputs]];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                let bias = bias.then_some(v[3]);
+                let first = tape.linear(v[0], v[2], bias, relu)?;
+                let second = tape.linear(v[1], v[2], bias, relu)?;
+                let second = tape.reshape(second, &[2, outputs])?;
+                let (a, b) = (tape.sum(first), tape.square(second));
+                tape.add(a, b)
             })
-            .boxed()
+        })
     }
 }

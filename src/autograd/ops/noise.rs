@@ -42,18 +42,14 @@ impl<T: Real> Tape<'_, T> {
 
 #[cfg(test)]
 pub(super) mod gradient {
-    use proptest::prelude::*;
-
-    use crate::autograd::check::property::{Cases, case, shapes};
+    use crate::autograd::check::property::{Cases, case, drawn, shapes};
 
     pub fn cases() -> Cases {
-        (shapes(), 0.0..2.0, any::<u64>())
-            .prop_map(|(x, deviation, seed)| {
-                case(&[&x], seed, 0.0, move |tape, v| {
-                    tape.set_dropout(Some(seed));
-                    Ok(tape.noise(v[0], deviation))
-                })
+        drawn((shapes(), 0.0..2.0), |(x, deviation), seed| {
+            case(&[&x], seed, 0.0, move |tape, v| {
+                tape.set_dropout(Some(seed));
+                Ok(tape.noise(v[0], deviation))
             })
-            .boxed()
+        })
     }
 }

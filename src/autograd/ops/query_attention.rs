@@ -126,10 +126,8 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
         if let Some(target) = context.target(self.weights.value_bias) {
             let db = target.so_far();
             for (row, dy) in dy.chunks_exact(dh).enumerate() {
-                let sum: T = self.m[row * padded..(row + 1) * padded]
-                    .iter()
-                    .copied()
-                    .sum();
+                let kept = &self.m[row * padded..(row + 1) * padded];
+                let sum: T = kept.iter().copied().sum();
                 let db = &mut db[sizes.head(row % heads)];
                 db.iter_mut().zip(dy).for_each(|(db, &dy)| *db += dy * sum);
             }
@@ -138,35 +136,21 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
         // ds in place of dm.
         let mut scratch = context.take(shape.scratch_len());
         let mut ds = context.take(batch * heads * padded);
-        scores(
-            &mut ds,
-            (sizes.rows(&dz), rows),
-            shape,
-            T::one(),
-            &mut scratch,
-        );
+        let pair = (sizes.rows(&dz), rows);
+        scores(&mut ds, pair, shape, T::one(), &mut scratch);
         vectorised(
             #[inline(always)]
             || {
-                for (row, (ds, dy)) in ds
-                    .chunks_exact_mut(padded)
-                    .zip(dy.chunks_exact(dh))
-                    .enumerate()
-                {
+                let rows = ds.chunks_exact_mut(padded).zip(dy.chunks_exact(dh));
+                for (row, (ds, dy)) in rows.enumerate() {
                     let bias = &bias[row % heads * dh..][..dh];
                     let shift = sum_with(dh, |d| bias[d] * dy[d]);
                     ds[..tokens].iter_mut().for_each(|d| *d += shift);
                 }
             },
         );
-        softmax_gradient(
-            context,
-            &mut ds,
-            self.dropout,
-            &self.p,
-            tokens,
-            sizes.scale(),
-        );
+        let scale = sizes.scale();
+        softmax_gradient(context, &mut ds, self.dropout, &self.p, tokens, scale);
         let mut du = context.take(batch * heads * width);
         let sums = |weights, for_keys, rows| Sums {
             weights,
@@ -240,14 +224,8 @@ impl<T: Real> Tape<'_, T> {
             let u = MatMut::new(&mut u, batch, heads * width);
             known.product(q_h, weight, u.columns(sizes.tokens_of_head(h)), false);
         }
-        let scale = sizes.scale();
-        scores(
-            &mut attention,
-            (sizes.rows(&u), rows),
-            shape,
-            scale,
-            &mut scratch,
-        );
+        let pair = (sizes.rows(&u), rows);
+        scores(&mut attention, pair, shape, sizes.scale(), &mut scratch);
         vectorised(
             #[inline(always)]
             || window_softmax(&mut attention, tokens),
@@ -279,21 +257,18 @@ impl<T: Real> Tape<'_, T> {
                 self.give(std::mem::take(buffer));
             }
         }
-        Ok(
-            self.record("query_attention", &inputs, &[batch, all], y, || {
-                QueryAttention {
-                    q,
-                    x,
-                    weights,
-                    sizes,
-                    dropout,
-                    u,
-                    p: attention,
-                    m,
-                    z,
-                }
-            }),
-        )
+        let operation = || QueryAttention {
+            q,
+            x,
+            weights,
+            sizes,
+            dropout,
+            u,
+            p: attention,
+            m,
+            z,
+        };
+        Ok(self.record("query_attention", &inputs, &[batch, all], y, operation))
     }
 
     fn query_attention_sizes(
@@ -312,12 +287,8 @@ impl<T: Real> Tape<'_, T> {
                 (batch, all, width)
             }
             _ => {
-                return Err(shapes_error(
-                    NAME,
-                    left,
-                    right,
-                    "q [B, d] and x [B * n, d']",
-                ));
+                let expected = "q [B, d] and x [B * n, d']";
+                return Err(shapes_error(NAME, left, right, expected));
             }
         };
         let heads = weights.keys.len();
@@ -353,41 +324,27 @@ pub(super) mod gradient {
     use proptest::prelude::*;
 
     use super::QueryAttentionWeights;
-    use crate::autograd::check::property::{Cases, case, strength};
+    use crate::autograd::check::property::{Cases, case, drawn, strength};
 
     /// Two heads that share no weight, with and without dropout; small scores and large.
     pub fn cases() -> Cases {
-        (
-            0usize..3,
-            1usize..10,
-            1usize..3,
-            1usize..4,
-            any::<bool>(),
-            strength(),
-            any::<u64>(),
-        )
-            .prop_map(|(batch, tokens, dh, width, dropout, strength, seed)| {
-                let weight: &[usize] = &[dh, width];
-                let shapes: [&[usize]; 7] = [
-                    &[batch, 2 * dh],
-                    &[batch * tokens, width],
-                    weight,
-                    weight,
-                    weight,
-                    weight,
-                    &[2 * dh],
-                ];
-                case(&shapes, seed, 0.0, move |tape, v| {
-                    tape.set_dropout(dropout.then_some(seed));
-                    let weights = QueryAttentionWeights {
-                        keys: vec![v[2], v[3]],
-                        values: vec![v[4], v[5]],
-                        value_bias: v[6],
-                    };
-                    let queries = tape.affine(v[0], strength, 0.0);
-                    tape.query_attention(queries, v[1], weights, tokens, 0.3)
-                })
+        let sizes = (0usize..3, 1usize..10, 1usize..3, 1usize..4);
+        let inputs = (sizes, any::<bool>(), strength());
+        drawn(inputs, |(sizes, dropout, strength), seed| {
+            let (batch, tokens, dh, width) = sizes;
+            let (q, x): (&[usize], &[usize]) = (&[batch, 2 * dh], &[batch * tokens, width]);
+            let (w, bias): (&[usize], &[usize]) = (&[dh, width], &[2 * dh]);
+            let shapes = [q, x, w, w, w, w, bias];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                tape.set_dropout(dropout.then_some(seed));
+                let weights = QueryAttentionWeights {
+                    keys: vec![v[2], v[3]],
+                    values: vec![v[4], v[5]],
+                    value_bias: v[6],
+                };
+                let queries = tape.affine(v[0], strength, 0.0);
+                tape.query_attention(queries, v[1], weights, tokens, 0.3)
             })
-            .boxed()
+        })
     }
 }

@@ -68,31 +68,20 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case, strength};
+    use crate::autograd::check::property::{Cases, case, drawn, strength};
 
     /// With and without dropout; more tokens than a padded chunk; small scores and large.
     pub fn cases() -> Cases {
-        (
-            0usize..3,
-            1usize..11,
-            1usize..4,
-            1usize..4,
-            any::<bool>(),
-            strength(),
-            any::<u64>(),
-        )
-            .prop_map(|(windows, tokens, heads, width, dropout, strength, seed)| {
-                let rows = windows * tokens;
-                case(
-                    &[&[rows, heads * width], &[rows, width]],
-                    seed,
-                    0.0,
-                    move |tape, v| {
-                        tape.set_dropout(dropout.then_some(seed));
-                        tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
-                    },
-                )
+        let sizes = (0usize..3, 1usize..11, 1usize..4, 1usize..4);
+        let inputs = (sizes, any::<bool>(), strength());
+        drawn(inputs, |(sizes, dropout, strength), seed| {
+            let (windows, tokens, heads, width) = sizes;
+            let rows = windows * tokens;
+            let shapes: [&[usize]; 2] = [&[rows, heads * width], &[rows, width]];
+            case(&shapes, seed, 0.0, move |tape, v| {
+                tape.set_dropout(dropout.then_some(seed));
+                tape.shared_attention(v[0], v[1], tokens, 0.7 * strength, 0.3)
             })
-            .boxed()
+        })
     }
 }

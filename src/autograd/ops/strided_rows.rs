@@ -38,22 +38,16 @@ impl<T: Real> Tape<'_, T> {
 pub(super) mod gradient {
     use proptest::prelude::*;
 
-    use crate::autograd::check::property::{Cases, case};
+    use crate::autograd::check::property::{Cases, case, drawn};
 
     pub fn cases() -> Cases {
-        (
-            0usize..4,
-            1usize..4,
-            0usize..3,
-            any::<prop::sample::Index>(),
-            any::<u64>(),
-        )
-            .prop_map(|(n, step, width, start, seed)| {
-                let start = start.index(step);
-                case(&[&[n * step, width]], seed, 0.0, move |tape, v| {
-                    tape.strided_rows(v[0], start, step)
-                })
+        let sizes = [0usize..4, 1..4, 0..3];
+        let inputs = (sizes, any::<prop::sample::Index>());
+        drawn(inputs, |([n, step, width], start), seed| {
+            let start = start.index(step);
+            case(&[&[n * step, width]], seed, 0.0, move |tape, v| {
+                tape.strided_rows(v[0], start, step)
             })
-            .boxed()
+        })
     }
 }

@@ -10,7 +10,7 @@ use super::curve::smooth;
 use super::feet::FootPose;
 use super::pelvis::{Pelvis, STRETCH};
 use super::score::Score;
-use super::upper_body::arm_pose;
+use super::upper_body::ArmPose;
 use crate::motion::ik::{aim, two_bone};
 use crate::motion::{Pose, Skeleton};
 
@@ -115,7 +115,7 @@ pub fn poses(
                 values[1] += 10.0 * ahead.abs() + RISE_LIFT * rise;
                 values[3] += 0.5 * RISE_LIFT * rise.abs();
                 rotations[ARMS[arm]..ARMS[arm] + 4]
-                    .copy_from_slice(&arm_pose(values).rotations(side));
+                    .copy_from_slice(&ArmPose::from_values(values).rotations(side));
             }
             Pose {
                 translations,

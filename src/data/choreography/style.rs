@@ -31,9 +31,18 @@ pub struct Style {
     pub arms: f64,
     /// How often arm figures follow the feet's figure (else drawn freely).
     pub coupling: f64,
-    /// Weight of each family of figures.
-    families: [(Family, f64); 5],
+    /// Weight of each of the [`FAMILIES`].
+    families: [f64; FAMILIES.len()],
 }
+
+/// The families of figures, as styles weigh them.
+const FAMILIES: [Family; 5] = [
+    Family::Steps,
+    Family::Turns,
+    Family::Sways,
+    Family::Jumps,
+    Family::Gestures,
+];
 
 /// The styles, in the order in which clips take turns.
 const STYLES: [Style; 6] = [
@@ -50,13 +59,7 @@ const STYLES: [Style; 6] = [
         trunk: 0.8,
         arms: 0.9,
         coupling: 0.93,
-        families: [
-            (Family::Steps, 4.0),
-            (Family::Turns, 3.0),
-            (Family::Sways, 1.5),
-            (Family::Jumps, 0.2),
-            (Family::Gestures, 0.8),
-        ],
+        families: [4.0, 3.0, 1.5, 0.2, 0.8],
     },
     Style {
         name: "lyrical",
@@ -71,13 +74,7 @@ const STYLES: [Style; 6] = [
         trunk: 1.2,
         arms: 1.0,
         coupling: 0.88,
-        families: [
-            (Family::Steps, 4.0),
-            (Family::Turns, 2.5),
-            (Family::Sways, 1.8),
-            (Family::Jumps, 0.6),
-            (Family::Gestures, 2.0),
-        ],
+        families: [4.0, 2.5, 1.8, 0.6, 2.0],
     },
     Style {
         name: "contemporary",
@@ -92,13 +89,7 @@ const STYLES: [Style; 6] = [
         trunk: 1.5,
         arms: 1.0,
         coupling: 0.82,
-        families: [
-            (Family::Steps, 4.0),
-            (Family::Turns, 2.5),
-            (Family::Sways, 1.8),
-            (Family::Jumps, 1.2),
-            (Family::Gestures, 1.8),
-        ],
+        families: [4.0, 2.5, 1.8, 1.2, 1.8],
     },
     Style {
         name: "jazz",
@@ -113,13 +104,7 @@ const STYLES: [Style; 6] = [
         trunk: 1.0,
         arms: 1.0,
         coupling: 0.90,
-        families: [
-            (Family::Steps, 4.0),
-            (Family::Turns, 2.5),
-            (Family::Sways, 1.5),
-            (Family::Jumps, 1.5),
-            (Family::Gestures, 1.5),
-        ],
+        families: [4.0, 2.5, 1.5, 1.5, 1.5],
     },
     Style {
         name: "folk",
@@ -134,13 +119,7 @@ const STYLES: [Style; 6] = [
         trunk: 0.6,
         arms: 0.85,
         coupling: 0.95,
-        families: [
-            (Family::Steps, 4.0),
-            (Family::Turns, 2.0),
-            (Family::Sways, 1.0),
-            (Family::Jumps, 2.0),
-            (Family::Gestures, 1.0),
-        ],
+        families: [4.0, 2.0, 1.0, 2.0, 1.0],
     },
     Style {
         name: "adagio",
@@ -155,13 +134,7 @@ const STYLES: [Style; 6] = [
         trunk: 1.1,
         arms: 1.0,
         coupling: 0.85,
-        families: [
-            (Family::Steps, 3.0),
-            (Family::Turns, 1.8),
-            (Family::Sways, 2.0),
-            (Family::Jumps, 0.1),
-            (Family::Gestures, 2.5),
-        ],
+        families: [3.0, 1.8, 2.0, 0.1, 2.5],
     },
 ];
 
@@ -184,9 +157,9 @@ impl Style {
 
     /// A family of figures, drawn by weight.
     pub fn draw_family(&self, rng: &mut ChaCha12Rng) -> Family {
-        let total: f64 = self.families.iter().map(|(_, weight)| weight).sum();
+        let total: f64 = self.families.iter().sum();
         let mut left = rng.random_range(0.0..total);
-        for (family, weight) in self.families {
+        for (family, weight) in FAMILIES.into_iter().zip(self.families) {
             if left < weight {
                 return family;
             }

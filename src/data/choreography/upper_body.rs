@@ -64,14 +64,8 @@ impl ArmPose {
         [self.forward, self.up, self.twist, self.elbow, self.wrist]
     }
 
-    fn from_values([forward, up, twist, elbow, wrist]: [f64; 5]) -> Self {
-        Self {
-            forward,
-            up,
-            twist,
-            elbow,
-            wrist,
-        }
+    pub fn from_values([forward, up, twist, elbow, wrist]: [f64; 5]) -> Self {
+        Self::new(forward, up, twist, elbow, wrist)
     }
 
     /// The share `share` of the way from here to `other`.
@@ -143,9 +137,4 @@ impl ArmTrack {
             })
             .collect()
     }
-}
-
-/// The pose of sampled values.
-pub fn arm_pose(values: [f64; 5]) -> ArmPose {
-    ArmPose::from_values(values)
 }

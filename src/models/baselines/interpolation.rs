@@ -2,14 +2,11 @@
 //! trajectory.
 
 use glam::{DQuat, DVec3};
-use ndarray::s;
-use rayon::prelude::*;
 
+use super::{facing_between, transitions};
 use crate::models::ModelError;
-use crate::models::transition::motion_rows::{rows_from, write_contacts};
-use crate::models::transition::window::wrap;
 use crate::models::transition::{KeyframePose, Transition, TransitionModel, TransitionRequest};
-use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
+use crate::motion::features::{BODY_POSITIONS, FACING};
 use crate::motion::{Pose, Skeleton};
 
 /// Spherical interpolation between the keyframes (the row "Interpolation" of table 2). Nothing is
@@ -42,40 +39,21 @@ impl TransitionModel for Interpolation {
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
-        requests
-            .par_iter()
-            .map(|request| self.transition(request))
-            .collect()
-    }
-}
-
-impl Interpolation {
-    fn transition(&self, request: &TransitionRequest) -> Result<Transition, ModelError> {
-        request.check()?;
-        let length = request.length();
-        let start = facing_pose(&request.start);
-        let target = facing_pose(&request.target);
-        let facing = request.start.features[FACING.start];
-        let turn = wrap(request.target.features[FACING.start] - facing);
-
-        let mut rows = rows_from(request.start.features.view(), length);
-        for step in 1..=length {
-            let share = step as f64 / length as f64;
-            let body = body_positions(&between(&start, &target, share), &request.skeleton);
-            for (column, position) in BODY_POSITIONS.step_by(3).zip(&body) {
-                rows[[step, column]] = position.x;
-                rows[[step, column + 1]] = position.y;
-                rows[[step, column + 2]] = position.z;
-            }
-            rows.slice_mut(s![step, ROOT_POSITION])
-                .assign(&request.root_trajectory.row(step));
-            rows[[step, FACING.start]] = facing + share * turn;
-        }
-        write_velocities(&mut rows);
-        write_contacts(&mut rows, self.contact_threshold);
-        Ok(Transition {
-            frames: rows.slice(s![1.., ..]).to_owned(),
-        })
+        transitions(
+            requests,
+            self.contact_threshold,
+            |request, share, mut row| {
+                let (start, target) = (&request.start, &request.target);
+                let pose = facing_pose(start).towards(&facing_pose(target), share);
+                let body = body_positions(&pose, &request.skeleton);
+                for (column, position) in BODY_POSITIONS.step_by(3).zip(&body) {
+                    row[column] = position.x;
+                    row[column + 1] = position.y;
+                    row[column + 2] = position.z;
+                }
+                row[FACING.start] = facing_between(request, share);
+            },
+        )
     }
 }
 
@@ -85,30 +63,6 @@ fn facing_pose(keyframe: &KeyframePose) -> Pose {
     let turned = DQuat::from_rotation_y(-keyframe.features[FACING.start]);
     pose.rotations[0] = turned * pose.rotations[0];
     pose
-}
-
-/// The pose `share` of the way from `start` to `target`.
-fn between(start: &Pose, target: &Pose, share: f64) -> Pose {
-    Pose {
-        translations: start
-            .translations
-            .iter()
-            .zip(&target.translations)
-            .map(|(a, b)| a.lerp(*b, share))
-            .collect(),
-        rotations: start
-            .rotations
-            .iter()
-            .zip(&target.rotations)
-            .map(|(a, b)| slerp(*a, *b, share))
-            .collect(),
-    }
-}
-
-/// Slerp along the shorter arc; `share` 0 and 1 give the ends.
-fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
-    let b = if a.dot(b) < 0.0 { -b } else { b };
-    a.slerp(b, share).normalize()
 }
 
 /// Positions of the 23 joints other than the root, relative to the root, in the pose's own frame.

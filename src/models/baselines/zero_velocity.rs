@@ -1,12 +1,11 @@
 //! The baseline "zero velocity": the pose of keyframe k1, carried along the given root trajectory.
 
 use ndarray::s;
-use rayon::prelude::*;
 
+use super::transitions;
 use crate::models::ModelError;
-use crate::models::transition::motion_rows::{rows_from, write_contacts};
 use crate::models::transition::{Transition, TransitionModel, TransitionRequest};
-use crate::motion::features::{BODY_POSITIONS, FACING, ROOT_POSITION, write_velocities};
+use crate::motion::features::{BODY_POSITIONS, FACING};
 
 /// Every frame has p^b and o^r of keyframe k1. Nothing is learned, and the target is not looked at:
 /// the floor of any model.
@@ -25,30 +24,11 @@ impl TransitionModel for ZeroVelocity {
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
-        requests
-            .par_iter()
-            .map(|request| self.transition(request))
-            .collect()
-    }
-}
-
-impl ZeroVelocity {
-    fn transition(&self, request: &TransitionRequest) -> Result<Transition, ModelError> {
-        request.check()?;
-        let start = &request.start.features;
-        let mut rows = rows_from(start.view(), request.length());
-        for step in 1..rows.nrows() {
+        transitions(requests, self.contact_threshold, |request, _, mut row| {
             for columns in [BODY_POSITIONS, FACING] {
-                rows.slice_mut(s![step, columns.clone()])
-                    .assign(&start.slice(s![columns]));
+                let kept = request.start.features.slice(s![columns.clone()]);
+                row.slice_mut(s![columns]).assign(&kept);
             }
-            rows.slice_mut(s![step, ROOT_POSITION])
-                .assign(&request.root_trajectory.row(step));
-        }
-        write_velocities(&mut rows);
-        write_contacts(&mut rows, self.contact_threshold);
-        Ok(Transition {
-            frames: rows.slice(s![1.., ..]).to_owned(),
         })
     }
 }

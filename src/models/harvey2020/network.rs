@@ -80,24 +80,13 @@ impl Harvey2020 {
         let mut layers = |name: &str, sizes: &[usize], last: LastLayer| {
             Mlp::with_activation(init, name, sizes, Activation::Plu, last)
         };
-        let state_encoder = layers("state_encoder", &[STATE, wide, code], LastLayer::Activated);
-        let offset_encoder = layers(
-            "offset_encoder",
-            &[OFFSET, wide, code],
-            LastLayer::Activated,
-        );
-        let target_encoder = layers(
-            "target_encoder",
-            &[ROTATIONS, wide, code],
-            LastLayer::Activated,
-        );
+        let (activated, linear) = (LastLayer::Activated, LastLayer::Linear);
+        let state_encoder = layers("state_encoder", &[STATE, wide, code], activated);
+        let offset_encoder = layers("offset_encoder", &[OFFSET, wide, code], activated);
+        let target_encoder = layers("target_encoder", &[ROTATIONS, wide, code], activated);
         let first = [STATE + BODY_VELOCITIES.len(), wide, 2 * recurrent];
-        let initial_state = layers("initial_state", &first, LastLayer::Linear);
-        let decoder = layers(
-            "decoder",
-            &[recurrent, wide, code, STATE],
-            LastLayer::Linear,
-        );
+        let initial_state = layers("initial_state", &first, linear);
+        let decoder = layers("decoder", &[recurrent, wide, code, STATE], linear);
         let lstm = Lstm::new(init, "lstm", 3 * code, recurrent);
         let critics = match config.adversarial {
             true => Critic::both(init, config),

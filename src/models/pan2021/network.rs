@@ -79,35 +79,17 @@ impl Pan2021 {
     ) -> Result<Self, ModelError> {
         config.check()?;
         let (wide, code) = (config.hidden, config.code);
-        let state_encoder = Mlp::new(
-            init,
-            "state_encoder",
-            &[STATE.len(), wide, code],
-            LastLayer::Activated,
-        );
-        let velocity_encoder = Mlp::new(
-            init,
-            "velocity_encoder",
-            &[VELOCITIES.len(), wide, code],
-            LastLayer::Activated,
-        );
-        let target_controller = Mlp::new(
-            init,
-            "target_controller",
-            &[KEYFRAME.len(), wide, code],
-            LastLayer::Activated,
-        );
+        let mut encoder =
+            |name: &str, sizes: &[usize]| Mlp::new(init, name, sizes, LastLayer::Activated);
+        let state_encoder = encoder("state_encoder", &[STATE.len(), wide, code]);
+        let velocity_encoder = encoder("velocity_encoder", &[VELOCITIES.len(), wide, code]);
+        let target_controller = encoder("target_controller", &[KEYFRAME.len(), wide, code]);
         let codes = if config.velocity_factor { 4 } else { 3 };
         let last_input = match config.lstms {
             1 => (codes + 1) * code,
             _ => 2 * code,
         };
-        let position_encoder = Mlp::new(
-            init,
-            "position_encoder",
-            &[4, last_input],
-            LastLayer::Activated,
-        );
+        let position_encoder = encoder("position_encoder", &[4, last_input]);
         let root_trajectory_controller =
             Controller::new(init, ROOT_TRAJECTORY_CONTROLLER, 3, config);
         let velocity_factor_controller = config.velocity_factor.then(|| {

@@ -29,18 +29,18 @@ struct Affine {
 impl Affine {
     fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
         let (outputs, inputs) = self.weight.dim();
-        let weight = tape.constant_with(&[outputs, inputs], |out| {
-            for (out, &x) in out.iter_mut().zip(self.weight.iter()) {
-                *out = T::from_f64(x);
-            }
-        });
+        let weight = constant(tape, &[outputs, inputs], &self.weight);
         let bias = constant(tape, &[outputs], &self.bias);
         tape.linear(x, weight, Some(bias), false)
     }
 }
 
 /// A constant from f64 numbers.
-pub(super) fn constant<T: Real>(tape: &mut Tape<'_, T>, shape: &[usize], values: &[f64]) -> Var {
+pub(super) fn constant<'v, T: Real>(
+    tape: &mut Tape<'_, T>,
+    shape: &[usize],
+    values: impl IntoIterator<Item = &'v f64>,
+) -> Var {
     tape.constant_with(shape, |out| {
         for (out, &x) in out.iter_mut().zip(values) {
             *out = T::from_f64(x);

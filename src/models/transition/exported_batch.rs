@@ -3,11 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use ndarray::{Array3, Axis};
 use safetensors::tensor::{Dtype, TensorView};
 
-use super::DanceClip;
-use super::{Batch, Feed, PoseWindows, RootFrame, Standardisation, TrainedModel, windows};
+use super::training_windows::{features_of, poses_of};
+use super::{Batch, DanceClip, Feed, RootFrame, Standardisation, TrainedModel, Window, windows};
 use crate::autograd::{AutogradError, Gradients, Tape, Workspace};
 use crate::models::ModelError;
 
@@ -88,19 +87,11 @@ fn cut(
     if all.is_empty() {
         return Err(ExportError::TooShort { frames });
     }
-    let shape = (frames + 1, count, crate::motion::features::FEATURES);
-    let mut features = Array3::zeros(shape);
-    let mut poses = PoseWindows::zeros(frames + 1, count);
-    for (k, mut target) in features.axis_iter_mut(Axis(1)).enumerate() {
-        let window = all[k * all.len() / count];
-        let clip = &clips[window.clip];
-        let cut = root_frame.window_features(&clip.features, window.start, frames);
-        target.assign(&standardisation.standardise(cut.view()).mapv(|x| x as f32));
-        poses.write(k, 0..=frames, &clip.clip.poses[window.start..]);
-    }
+    let chosen: Vec<Window> = (0..count).map(|k| all[k * all.len() / count]).collect();
+    let shown = (standardisation, root_frame);
     Ok(Batch {
-        poses: Some(poses),
-        ..Batch::of(features)
+        poses: Some(poses_of(clips, &chosen, frames)),
+        ..Batch::of(features_of(clips, &chosen, frames, shown))
     })
 }
 

@@ -110,30 +110,6 @@ impl TransitionRequest {
             velocity_factors: rows(&request.velocity_factors, PARTS),
         })
     }
-
-    /// As what any model may be asked, with `frame_time` seconds from one frame to the next.
-    pub fn into_request(self, frame_time: f64) -> Request {
-        let frames = self.root_trajectory.nrows();
-        let given = |frame: usize, keyframe: KeyframePose| Given {
-            frame: frame as i64,
-            pose: keyframe.pose,
-            features: Some(keyframe.features),
-        };
-        Request {
-            skeleton: self.skeleton,
-            frame_time,
-            frames,
-            given: vec![
-                given(0, self.start),
-                given(frames.saturating_sub(1), self.target),
-            ],
-            root: Some(self.root_trajectory),
-            velocity_factors: Some(self.velocity_factors),
-            contacts: None,
-            music: None,
-            seed: 0,
-        }
-    }
 }
 
 /// What a pose by itself tells, `[154]`: its own facing direction, and velocities from the pose

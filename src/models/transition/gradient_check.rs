@@ -7,16 +7,14 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::{
-    Batch, DanceClip, Feed, ModelConfig, PoseWindows, SingleFrame, Standardisation, window_features,
-};
+use super::training_windows::{features_of, poses_of};
+use super::{Batch, DanceClip, Feed, ModelConfig, RootFrame, SingleFrame, Standardisation, Window};
 use crate::autograd::check::{CheckReport, check_parameters};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
 use crate::data::{DataConfig, DataError};
 use crate::models::settings::GradientCheckOptions;
 use crate::models::{CRITICS, ModelError};
-use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
 
 /// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
@@ -121,15 +119,10 @@ pub fn generated_batch(
         .map(|clip| DanceClip::new(clip.clip, None, &DataConfig::default()))
         .collect::<Result<Vec<_>, _>>()?;
     let standardisation = Standardisation::fit(clips.iter().map(|clip| clip.features.view()));
-    let mut features = Array3::zeros((transition + 1, windows, FEATURES));
-    let mut poses = PoseWindows::zeros(transition + 1, windows);
     let start = SPARE_FRAMES / 2;
-    for (window, clip) in clips.iter().enumerate() {
-        let cut = window_features(&clip.features, start, transition);
-        let cut = standardisation.standardise(cut.view());
-        features.index_axis_mut(Axis(1), window).assign(&cut);
-        poses.write(window, 0..=transition, &clip.clip.poses[start..]);
-    }
+    let cut: Vec<Window> = (0..windows).map(|clip| Window { clip, start }).collect();
+    let shown = (&standardisation, RootFrame::World);
+    let features: Array3<f64> = features_of(&clips, &cut, transition, shown);
     let single_frames: Vec<_> = features
         .axis_iter(Axis(1))
         .map(|window| SingleFrame {
@@ -141,25 +134,12 @@ pub fn generated_batch(
         })
         .collect();
     let batch = Batch {
-        poses: Some(poses),
+        poses: Some(poses_of(&clips, &cut, transition)),
         total_single_frames: single_frames.len(),
         single_frames,
         ..Batch::of(features)
     };
     Ok((batch, standardisation))
-}
-
-/// The features alone of [`generated_batch`], standardised `[transition + 1, windows, 154]`.
-///
-/// # Errors
-/// As [`generated_batch`].
-pub fn generated_windows(
-    transition: usize,
-    windows: usize,
-    seed: u64,
-) -> Result<(Array3<f64>, Standardisation), GradientCheckError> {
-    let (batch, standardisation) = generated_batch(transition, windows, seed)?;
-    Ok((batch.features, standardisation))
 }
 
 /// Compares the gradient of a model's total loss with central differences: for critics of their own

@@ -10,7 +10,7 @@ use super::settings::TransitionSettings;
 use super::single_frames;
 use super::task::{StepPlan, TransitionStep};
 use super::training_windows::TrainingWindows;
-use super::{DanceClip, Feed, Network, RootFrame, Standardisation, TrainedModel, Window};
+use super::{DanceClip, Feed, Network, RootFrame, Standardisation, Window};
 use crate::autograd::Parameters;
 use crate::models::settings::InitialRng;
 use crate::models::{Generator, ModelError, Statistics, Step, Streams, Task};
@@ -112,12 +112,6 @@ impl Task<f32> for MadeUpTask {
     }
 
     fn generator(&self, name: &str, parameters: Parameters<f32>) -> Box<dyn Generator> {
-        Box::new(TrainedModel::new(
-            name.into(),
-            self.network.clone(),
-            parameters,
-            self.windows.standardisation.clone(),
-            self.windows.root_frame,
-        ))
+        self.windows.model(name, &self.network, parameters)
     }
 }

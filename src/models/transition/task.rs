@@ -10,10 +10,9 @@ use super::augmentation::Augmentation;
 use super::schedule::parts;
 use super::settings::{ScheduledSamplingConfig, TransitionSettings};
 use super::single_frames::{self, SingleFramePlan};
-use super::training_windows::TrainingWindows;
+use super::training_windows::{TrainingWindows, poses_of};
 use super::{
-    Batch, BatchPlan, DanceClip, DataRanges, Feed, Network, Schedule, Standardisation,
-    TrainedModel, Window,
+    Batch, BatchPlan, DanceClip, DataRanges, Feed, Network, Schedule, Standardisation, Window,
 };
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::models::settings::TaskSetting;
@@ -84,11 +83,6 @@ impl TransitionTask {
             ranges,
             epoch: Mutex::new(None),
         })
-    }
-
-    /// The curriculum.
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
     }
 
     fn batches(&self, epoch: usize) -> Arc<Vec<BatchPlan>> {
@@ -169,13 +163,7 @@ impl Task<f32> for TransitionTask {
     }
 
     fn generator(&self, name: &str, parameters: Parameters<f32>) -> Box<dyn Generator> {
-        Box::new(TrainedModel::new(
-            name.into(),
-            self.network.clone(),
-            parameters,
-            self.windows.standardisation.clone(),
-            self.windows.root_frame,
-        ))
+        self.windows.model(name, &self.network, parameters)
     }
 
     fn summary(&self) -> Option<String> {
@@ -240,12 +228,10 @@ impl Step<f32> for TransitionStep<'_> {
         } = &self.plan;
         let of_shard = |len: usize| parts(len, self.shards()).nth(shard).unwrap_or(0..0);
         let shard_windows = &windows[of_shard(windows.len())];
+        let poses = || poses_of(&self.windows.clips, shard_windows, *length);
         let batch = Batch {
             features: self.windows.features(shard_windows, *length),
-            poses: match self.network.reads_poses() {
-                true => self.windows.poses(shard_windows, *length),
-                false => None,
-            },
+            poses: self.network.reads_poses().then(poses),
             total_windows: windows.len(),
             single_frames: self
                 .windows

@@ -1,9 +1,15 @@
 //! Clips that are trained, and how their windows become network input.
 
+use std::sync::Arc;
+
 use ndarray::{Array3, Axis};
 
 use super::single_frames::SingleFramePlan;
-use super::{DanceClip, PoseWindows, RootFrame, SingleFrame, Standardisation, Window};
+use super::{
+    DanceClip, Network, PoseWindows, RootFrame, SingleFrame, Standardisation, TrainedModel, Window,
+};
+use crate::autograd::{Parameters, Real};
+use crate::models::Generator;
 use crate::motion::features::FEATURES;
 
 /// What is trained, and how it is standardised.
@@ -16,18 +22,8 @@ pub(super) struct TrainingWindows {
 impl TrainingWindows {
     /// Standardised features of windows of `length` + 1 frames, `[length + 1, windows, 154]`.
     pub fn features(&self, windows: &[Window], length: usize) -> Array3<f32> {
-        let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
-        for (k, window) in windows.iter().enumerate() {
-            let clip = &self.clips[window.clip].features;
-            let cut = self.root_frame.window_features(clip, window.start, length);
-            features.index_axis_mut(Axis(1), k).assign(
-                &self
-                    .standardisation
-                    .standardise(cut.view())
-                    .mapv(|x| x as f32),
-            );
-        }
-        features
+        let shown = (&self.standardisation, self.root_frame);
+        features_of(&self.clips, windows, length, shown)
     }
 
     /// Single frames with the standardised features of their windows.
@@ -41,14 +37,51 @@ impl TrainingWindows {
             .collect()
     }
 
-    /// Poses of the same windows; none where a clip has none of its own.
-    pub fn poses(&self, windows: &[Window], length: usize) -> Option<PoseWindows<f32>> {
-        let mut cut = PoseWindows::zeros(length + 1, windows.len());
-        for (k, window) in windows.iter().enumerate() {
-            let frames = window.start..=window.start + length;
-            let poses = &self.clips[window.clip].clip.poses;
-            cut.write(k, 0..=length, poses.get(frames)?);
-        }
-        Some(cut)
+    /// A network of these windows with weights, as a model.
+    pub fn model(
+        &self,
+        name: &str,
+        network: &Arc<dyn Network<f32>>,
+        parameters: Parameters<f32>,
+    ) -> Box<dyn Generator> {
+        Box::new(TrainedModel::new(
+            name.into(),
+            network.clone(),
+            parameters,
+            self.standardisation.clone(),
+            self.root_frame,
+        ))
     }
+}
+
+/// Features of windows of `length` + 1 frames of clips, `[length + 1, windows, 154]`, standardised
+/// in the frame of reference that goes with the statistics.
+pub(super) fn features_of<T: Real>(
+    clips: &[DanceClip],
+    windows: &[Window],
+    length: usize,
+    (standardisation, root_frame): (&Standardisation, RootFrame),
+) -> Array3<T> {
+    let mut features = Array3::zeros((length + 1, windows.len(), FEATURES));
+    for (mut target, window) in features.axis_iter_mut(Axis(1)).zip(windows) {
+        let clip = &clips[window.clip].features;
+        let cut = root_frame.window_features(clip, window.start, length);
+        let standardised = standardisation.standardise(cut.view());
+        target.assign(&standardised.mapv(T::from_f64));
+    }
+    features
+}
+
+/// Poses of the same windows.
+pub(super) fn poses_of<T: Real>(
+    clips: &[DanceClip],
+    windows: &[Window],
+    length: usize,
+) -> PoseWindows<T> {
+    let mut cut = PoseWindows::zeros(length + 1, windows.len());
+    for (k, window) in windows.iter().enumerate() {
+        let poses = &clips[window.clip].clip.poses[window.start..];
+        cut.write(k, 0..=length, poses);
+    }
+    cut
 }

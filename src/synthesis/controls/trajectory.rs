@@ -106,13 +106,10 @@ impl SequenceRequest {
     }
 
     fn centre(&self) -> DVec3 {
-        self.keyframes
-            .first()
-            .map_or(DVec3::ZERO, |timed| timed.keyframe.pose.translations[0])
+        let first = self.keyframes.first();
+        first.map_or(DVec3::ZERO, |timed| timed.keyframe.pose.translations[0])
     }
-}
 
-impl SequenceRequest {
     /// The same on a path through points, one a frame, cm: [`SequenceRequest::on_trajectory`].
     ///
     /// # Errors

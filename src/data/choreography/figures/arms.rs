@@ -147,6 +147,19 @@ fn pair(score: &mut Score, beats: f64, side: f64, near: ArmPose, far: ArmPose) {
     }
 }
 
+/// Keys the arm of the cue's side with the first pose and the other with the second, each at a
+/// share of the figure's beats.
+fn keys<const N: usize>(
+    score: &mut Score,
+    beats: f64,
+    cue: Cue,
+    poses: [(f64, ArmPose, ArmPose); N],
+) {
+    for (share, near, far) in poses {
+        pair(score, share * beats, side(cue), near, far);
+    }
+}
+
 /// Each step brings the opposite arm forward.
 fn opposition(score: &mut Score, beats: f64, cue: Cue) {
     let (step, first) = match cue {
@@ -167,24 +180,17 @@ fn opposition(score: &mut Score, beats: f64, cue: Cue) {
 
 /// Low, before the chest, then open: overhead on the side of the cue.
 fn port_de_bras(score: &mut Score, beats: f64, cue: Cue) {
-    let side = side(cue);
-    score.arms(0.3 * beats, ArmPose::FIRST, ArmPose::FIRST);
-    match cue {
-        Cue::Leg { forward, .. } if forward < -0.5 => {
-            pair(score, 0.62 * beats, side, ArmPose::SECOND, ArmPose::CALL);
-        }
-        Cue::Leg { forward, .. } if forward > 0.5 => {
-            pair(score, 0.62 * beats, side, ArmPose::SECOND, ArmPose::HIGH);
-        }
-        _ => pair(score, 0.62 * beats, side, ArmPose::HIGH, ArmPose::SECOND),
-    }
-    pair(
-        score,
-        beats,
-        side,
-        ArmPose::LOW,
-        ArmPose::SECOND.moved(6.0, -30.0),
-    );
+    let (near, far) = match cue {
+        Cue::Leg { forward, .. } if forward < -0.5 => (ArmPose::SECOND, ArmPose::CALL),
+        Cue::Leg { forward, .. } if forward > 0.5 => (ArmPose::SECOND, ArmPose::HIGH),
+        _ => (ArmPose::HIGH, ArmPose::SECOND),
+    };
+    let poses = [
+        (0.3, ArmPose::FIRST, ArmPose::FIRST),
+        (0.62, near, far),
+        (1.0, ArmPose::LOW, ArmPose::SECOND.moved(6.0, -30.0)),
+    ];
+    keys(score, beats, cue, poses);
 }
 
 /// A wave that runs from one arm to the other, following the weight.
@@ -195,15 +201,12 @@ fn wave(score: &mut Score, beats: f64, cue: Cue) {
     };
     let mut beat = 0.0;
     while beat + swing <= beats + 1e-9 {
-        let near = ArmPose::SECOND.moved(0.0, 34.0);
-        let far = ArmPose::SECOND.moved(6.0, -32.0);
-        pair(
-            score,
-            beat + 0.35 * swing,
-            side,
+        let (wing, near) = (
             ArmPose::WING.moved(4.0, -6.0),
-            far.moved(0.0, 12.0),
+            ArmPose::SECOND.moved(0.0, 34.0),
         );
+        let far = ArmPose::SECOND.moved(6.0, -32.0);
+        pair(score, beat + 0.35 * swing, side, wing, far.moved(0.0, 12.0));
         pair(score, beat + 0.9 * swing, side, near, far);
         side = -side;
         beat += swing;
@@ -232,91 +235,52 @@ fn circle(score: &mut Score, beats: f64, cue: Cue) {
 
 /// One arm reaches where the body goes, the other balances it.
 fn reach(score: &mut Score, beats: f64, cue: Cue) {
-    let side = side(cue);
     let (near, far) = match cue {
         Cue::Travel { forward, .. } if forward > 0.5 => (ArmPose::CALL, ArmPose::BACK),
         Cue::Travel { .. } | Cue::Sway { .. } => (ArmPose::SKY, ArmPose::SECOND.moved(-8.0, -22.0)),
         _ => (ArmPose::FRONT, ArmPose::BACK.moved(0.0, 20.0)),
     };
-    pair(score, 0.22 * beats, side, ArmPose::ACROSS, ArmPose::LOW);
-    pair(score, 0.6 * beats, side, near, far);
-    pair(
-        score,
-        0.8 * beats,
-        side,
-        near.moved(-6.0, 4.0),
-        far.moved(-4.0, 4.0),
-    );
-    pair(
-        score,
-        beats,
-        side,
-        ArmPose::SECOND.moved(4.0, -35.0),
-        ArmPose::LOW,
-    );
+    let poses = [
+        (0.22, ArmPose::ACROSS, ArmPose::LOW),
+        (0.6, near, far),
+        (0.8, near.moved(-6.0, 4.0), far.moved(-4.0, 4.0)),
+        (1.0, ArmPose::SECOND.moved(4.0, -35.0), ArmPose::LOW),
+    ];
+    keys(score, beats, cue, poses);
 }
 
 /// Open, gather before the chest while turning, open again.
 fn gather(score: &mut Score, beats: f64, cue: Cue) {
-    let side = side(cue);
-    pair(score, 0.16 * beats, side, ArmPose::SECOND, ArmPose::FIRST);
-    pair(
-        score,
-        0.4 * beats,
-        side,
-        ArmPose::FIRST,
-        ArmPose::FIRST.moved(8.0, 0.0),
-    );
-    score.arms(
-        0.68 * beats,
-        ArmPose::FIRST.moved(0.0, 6.0),
-        ArmPose::FIRST.moved(0.0, 6.0),
-    );
-    pair(
-        score,
-        beats,
-        side,
-        ArmPose::SECOND.moved(0.0, 12.0),
-        ArmPose::SECOND,
-    );
+    let gathered = ArmPose::FIRST.moved(0.0, 6.0);
+    let poses = [
+        (0.16, ArmPose::SECOND, ArmPose::FIRST),
+        (0.4, ArmPose::FIRST, ArmPose::FIRST.moved(8.0, 0.0)),
+        (0.68, gathered, gathered),
+        (1.0, ArmPose::SECOND.moved(0.0, 12.0), ArmPose::SECOND),
+    ];
+    keys(score, beats, cue, poses);
 }
 
 /// Back and down, then up with the rise, and out.
 fn scoop(score: &mut Score, beats: f64) {
-    score.arms(0.3 * beats, ArmPose::BACK, ArmPose::BACK);
-    score.arms(
-        0.48 * beats,
-        ArmPose::FRONT.moved(-15.0, 10.0),
-        ArmPose::FRONT.moved(-15.0, 10.0),
-    );
-    score.arms(0.6 * beats, ArmPose::SKY, ArmPose::SKY);
-    score.arms(0.82 * beats, ArmPose::SECOND, ArmPose::SECOND);
-    score.arms(beats, ArmPose::LOW, ArmPose::LOW);
+    for (share, pose) in [
+        (0.3, ArmPose::BACK),
+        (0.48, ArmPose::FRONT.moved(-15.0, 10.0)),
+        (0.6, ArmPose::SKY),
+        (0.82, ArmPose::SECOND),
+        (1.0, ArmPose::LOW),
+    ] {
+        score.arms(share * beats, pose, pose);
+    }
 }
 
 /// One hand at the waist, the other bent up and swinging.
 fn waist(score: &mut Score, beats: f64, cue: Cue) {
-    let side = side(cue);
-    pair(score, 0.25 * beats, side, ArmPose::CACTUS, ArmPose::HIP);
-    pair(
-        score,
-        0.5 * beats,
-        side,
-        ArmPose::SKY,
-        ArmPose::HIP.moved(3.0, 3.0),
-    );
-    pair(
-        score,
-        0.75 * beats,
-        side,
-        ArmPose::CACTUS.moved(10.0, 5.0),
-        ArmPose::HIP,
-    );
-    pair(
-        score,
-        beats,
-        side,
-        ArmPose::SECOND,
-        ArmPose::HIP.moved(4.0, 2.0),
-    );
+    let poses = [
+        (0.25, ArmPose::CACTUS, ArmPose::HIP),
+        (0.5, ArmPose::SKY, ArmPose::HIP.moved(3.0, 3.0)),
+        (0.75, ArmPose::CACTUS.moved(10.0, 5.0), ArmPose::HIP),
+        (1.0, ArmPose::SECOND, ArmPose::HIP.moved(4.0, 2.0)),
+    ];
+    keys(score, beats, cue, poses);
 }

@@ -46,15 +46,8 @@ fn raise(score: &mut Score, rng: &mut ChaCha12Rng) {
     } else {
         rng.random_range(0.7..1.4)
     };
-    accompany(
-        score,
-        beats,
-        Cue::Leg {
-            side,
-            forward: way.0,
-        },
-        rng,
-    );
+    let forward = way.0;
+    accompany(score, beats, Cue::Leg { side, forward }, rng);
     let yaw = score.heading + side * turned_out;
     let pitch = |angle: f64| if behind { 0.95 + angle } else { 0.95 - angle };
     let via = |at: f64, angle: f64, length: f64, score: &Score| Via {
@@ -93,9 +86,8 @@ fn raise(score: &mut Score, rng: &mut ChaCha12Rng) {
     let stance = score.weight_on(foot.other(), 0.95);
     score.balance.key(from + 4.0, [stance]);
     score.balance.key(land - 4.0, [stance]);
-    score
-        .balance
-        .key(land + 6.0, [score.weight_on(foot.other(), 0.55)]);
+    let weight = score.weight_on(foot.other(), 0.55);
+    score.balance.key(land + 6.0, [weight]);
     let lean = top * if behind { 20.0 } else { -9.0 * way.0 };
     let aside = top * 8.0 * way.1;
     score.sink(0.5, 0.35 * score.style.depth);
@@ -154,15 +146,8 @@ fn point(score: &mut Score, rng: &mut ChaCha12Rng) {
         score.look(beat + 1.2 * unit, [5.0, 0.0, 26.0 * left]);
         score.look(beat + 3.2 * unit, [0.0; 3]);
     }
-    accompany(
-        score,
-        beats,
-        Cue::Leg {
-            side,
-            forward: chosen.0,
-        },
-        rng,
-    );
+    let forward = chosen.0;
+    accompany(score, beats, Cue::Leg { side, forward }, rng);
     score.sink(beats, 0.0);
     score.spine(beats, [0.0; 3]);
     score.free = foot;

@@ -88,17 +88,13 @@ fn leap(score: &mut Score, rng: &mut ChaCha12Rng) {
     let push = score.free;
     let lead = push.other();
     let side = draw_side(rng);
-    accompany(
-        score,
-        beats,
-        Cue::Travel {
-            forward,
-            left,
-            step: unit,
-            first: push.side(),
-        },
-        rng,
-    );
+    let cue = Cue::Travel {
+        forward,
+        left,
+        step: unit,
+        first: push.side(),
+    };
+    accompany(score, beats, cue, rng);
     score.centre += Score::floor(heading, forward * run, left * run);
     let placement = score.home(push, score.centre, heading, -3.0);
     score.step(push, 0.0, 0.95 * unit, placement, Swing::step(6.0));
@@ -115,16 +111,11 @@ fn leap(score: &mut Score, rng: &mut ChaCha12Rng) {
         yaw: placement.yaw,
         pitch: 30f64.to_radians(),
     };
-    score.feet[lead.index()].swing(
-        takeoff - 7.0,
-        None,
-        landing,
-        placement,
-        Swing {
-            landing: 25f64.to_radians(),
-            ..Swing::step(0.0).through(vec![reach])
-        },
-    );
+    let swing = Swing {
+        landing: 25f64.to_radians(),
+        ..Swing::step(0.0).through(vec![reach])
+    };
+    score.feet[lead.index()].swing(takeoff - 7.0, None, landing, placement, swing);
     // The pushing leg stays behind and closes after the landing.
     let close = score.home(push, score.centre, heading, 0.0);
     let off = score.feet[push.index()].placement();
@@ -136,16 +127,11 @@ fn leap(score: &mut Score, rng: &mut ChaCha12Rng) {
         pitch: 75f64.to_radians(),
     };
     let closed = landing + (0.9 * unit * score.rhythm.beat()).max(11.0);
-    score.feet[push.index()].swing(
-        takeoff - 5.0,
-        Some(takeoff),
-        closed,
-        close,
-        Swing {
-            push: 48f64.to_radians(),
-            ..Swing::step(0.0).through(vec![behind])
-        },
-    );
+    let swing = Swing {
+        push: 48f64.to_radians(),
+        ..Swing::step(0.0).through(vec![behind])
+    };
+    score.feet[push.index()].swing(takeoff - 5.0, Some(takeoff), closed, close, swing);
     score.jumps.push(Jump {
         start: score.frame(0.9 * unit),
         crouch: takeoff - 6.0,
@@ -157,9 +143,8 @@ fn leap(score: &mut Score, rng: &mut ChaCha12Rng) {
     let (on_push, on_lead) = (score.weight_on(push, 0.95), score.weight_on(lead, 0.95));
     score.balance.key(takeoff - 3.0, [on_push]);
     score.balance.key(landing + 2.0, [on_lead]);
-    score
-        .balance
-        .key(closed - 2.0, [score.weight_on(lead, 0.85)]);
+    let weight = score.weight_on(lead, 0.85);
+    score.balance.key(closed - 2.0, [weight]);
     score.balance.key(closed + 5.0, [0.5]);
     score.spine(1.6 * unit, [10.0, 0.0, 6.0 * side]);
     score.tilt(1.6 * unit, [6.0, 0.0]);

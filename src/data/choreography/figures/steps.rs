@@ -78,17 +78,13 @@ pub fn walk(score: &mut Score, rng: &mut ChaCha12Rng) {
 fn side_steps(score: &mut Score, rng: &mut ChaCha12Rng) {
     let length = 0.75 * score.style.step;
     let there = score.free.side();
-    accompany(
-        score,
-        4.0,
-        Cue::Travel {
-            forward: 0.0,
-            left: there,
-            step: 2.0,
-            first: there,
-        },
-        rng,
-    );
+    let cue = Cue::Travel {
+        forward: 0.0,
+        left: there,
+        step: 2.0,
+        first: there,
+    };
+    accompany(score, 4.0, cue, rng);
     let turn = 0.35 * f64::from(rng.random_range(-1i8..=1));
     for bar in 0..2 {
         let beat = 2.0 * f64::from(bar);
@@ -166,17 +162,13 @@ fn grapevine(score: &mut Score, rng: &mut ChaCha12Rng) {
     let lead = score.free;
     let side = lead.side();
     let behind = draw_side(rng);
-    accompany(
-        score,
-        4.0,
-        Cue::Travel {
-            forward: 0.0,
-            left: side,
-            step: 1.0,
-            first: side,
-        },
-        rng,
-    );
+    let cue = Cue::Travel {
+        forward: 0.0,
+        left: side,
+        step: 1.0,
+        first: side,
+    };
+    accompany(score, 4.0, cue, rng);
     let heading = score.heading;
     let way = Score::floor(heading, 0.0, side * length);
     for step in 0..4u8 {
@@ -242,9 +234,8 @@ fn lunge(score: &mut Score, rng: &mut ChaCha12Rng) {
     let (start, back) = (score.frame(2.5), score.frame(3.7));
     score.balance.key(start + 0.4 * (back - start), [recover]);
     score.feet[foot.index()].swing(start, None, back, home, Swing::step(6.0));
-    score
-        .balance
-        .key(back + 3.0, [score.weight_on(foot.other(), 0.6)]);
+    let weight = score.weight_on(foot.other(), 0.6);
+    score.balance.key(back + 3.0, [weight]);
     score.tilt(4.0, [0.0; 2]);
     score.spine(4.0, [0.0; 3]);
     score.look(4.0, [0.0; 3]);
