@@ -106,9 +106,8 @@ pub trait Generator: Send + Sync {
     /// # Errors
     /// As [`Generator::generate`]; a model that has none.
     fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
-        let motions = self.generate(requests)?;
+        let motions = self.generate(requests)?.into_iter();
         motions
-            .into_iter()
             .map(|motion| motion.raw.ok_or_else(|| self.lacks("raw output")))
             .collect()
     }
@@ -169,28 +168,26 @@ impl Request {
     /// # Errors
     /// [`ModelError::Missing`] that names what to give, [`ModelError::Shape`], [`ModelError::NotFinite`].
     pub fn check(&self, model: &str, needs: &Needs) -> Result<(), ModelError> {
-        let missing = |what: String| ModelError::Missing {
-            model: model.into(),
-            what,
-        };
+        let model = model.to_string();
+        let missing = |what| Err(ModelError::Missing { model, what });
         let at = |frame: i64| self.given.iter().any(|given| given.frame == frame);
         let last = self.frames as i64 - 1;
         let ends = at(0) && at(last);
         let own = self.given.iter().filter(|given| given.frame >= 0).count();
         match needs.poses {
             NeededPoses::Past(frames) if (1..=frames as i64).any(|before| !at(-before)) => {
-                return Err(missing(format!("the {frames} poses before frame 0")));
+                return missing(format!("the {frames} poses before frame 0"));
             }
             NeededPoses::Ends if !(ends && self.frames > 1 && own == 2) => {
-                return Err(missing(format!("two poses, at frame 0 and frame {last}")));
+                return missing(format!("two poses, at frame 0 and frame {last}"));
             }
             NeededPoses::Keyframes if !ends => {
-                return Err(missing(format!("poses at frame 0 and frame {last}")));
+                return missing(format!("poses at frame 0 and frame {last}"));
             }
             _ => {}
         }
         if let Some(condition) = needs.conditions.iter().find(|&&it| !self.has(it)) {
-            return Err(missing(format!("the {}", condition.title())));
+            return missing(format!("the {}", condition.title()));
         }
         for (what, array) in [
             ("root trajectory", &self.root),
@@ -198,18 +195,32 @@ impl Request {
             ("contacts", &self.contacts),
         ] {
             let Some(array) = array else { continue };
-            if array.nrows() != self.frames {
-                return Err(ModelError::Shape {
-                    what: what.into(),
-                    expected: vec![self.frames, array.ncols()],
-                    found: array.shape().to_vec(),
-                });
-            }
-            if !array.iter().all(|x| x.is_finite()) {
-                return Err(ModelError::NotFinite { what: what.into() });
-            }
+            let expected = [self.frames, array.ncols()];
+            check_shape(what, &expected, array.shape())?;
+            check_finite(what, array)?;
         }
         Ok(())
+    }
+}
+
+fn check_shape(what: &str, expected: &[usize], found: &[usize]) -> Result<(), ModelError> {
+    match expected == found {
+        true => Ok(()),
+        false => Err(ModelError::Shape {
+            what: what.into(),
+            expected: expected.to_vec(),
+            found: found.to_vec(),
+        }),
+    }
+}
+
+fn check_finite<'x>(
+    what: &str,
+    numbers: impl IntoIterator<Item = &'x f64>,
+) -> Result<(), ModelError> {
+    match numbers.into_iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(ModelError::NotFinite { what: what.into() }),
     }
 }
 
@@ -219,30 +230,16 @@ impl Motion {
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`].
     pub fn check(&self, request: &Request) -> Result<(), ModelError> {
-        let shape = |what: &str, expected: &[usize], found: &[usize]| match expected == found {
-            true => Ok(()),
-            false => Err(ModelError::Shape {
-                what: what.into(),
-                expected: expected.to_vec(),
-                found: found.to_vec(),
-            }),
-        };
-        let frames = request.frames;
-        let joints = request.skeleton.joints.len();
+        let (frames, joints) = (request.frames, request.skeleton.joints.len());
         let positions = self.positions.shape();
-        shape("predicted positions", &[frames, joints, 3], positions)?;
+        check_shape("predicted positions", &[frames, joints, 3], positions)?;
         if let Some(poses) = &self.poses {
-            shape("predicted poses", &[frames], &[poses.len()])?;
+            check_shape("predicted poses", &[frames], &[poses.len()])?;
         }
         if let Some(facing) = &self.facing {
-            shape("predicted facing angles", &[frames], facing.shape())?;
+            check_shape("predicted facing angles", &[frames], facing.shape())?;
         }
-        if !self.positions.iter().all(|x| x.is_finite()) {
-            return Err(ModelError::NotFinite {
-                what: "predicted frames".into(),
-            });
-        }
-        Ok(())
+        check_finite("predicted frames", &self.positions)
     }
 }
 
