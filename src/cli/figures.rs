@@ -60,31 +60,26 @@ pub struct FiguresArgs {
 /// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &[])?;
-    let compared: Vec<Subject> = args
-        .compare
-        .iter()
-        .map(|path| Subject::open(path, &[]))
-        .collect::<Result<_, _>>()?;
-    let cast = Cast::new(subject, compared)?;
-    let dataset = Dataset::load(&args.data, &cast.subject().config.data)?;
+    let compared = args.compare.iter().map(|path| Subject::open(path, &[]));
+    let cast = Cast::new(subject, compared.collect::<Result<_, _>>()?)?;
+    let data = &cast.subject().config.data;
+    let dataset = Dataset::load(&args.data, data)?;
     if !args.other_data {
         cast.check_data(&dataset, &args.data)?;
     }
-    let features = cast.subject().config.data.features();
-    let clips = DanceClip::measure_all(&dataset.test, &features)?;
-    let stage = Stage::new(
-        &clips,
-        &Choice {
-            length: args.length.into(),
-            clip: args.clip.as_deref(),
-            start: args.start,
-        },
-    )?;
-    let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
-    let page = match &args.viewer {
-        Some(_) => Some(cast.page(&stage)?),
-        None => None,
+    let clips = DanceClip::measure_all(&dataset.test, &data.features())?;
+    let choice = Choice {
+        length: args.length.into(),
+        clip: args.clip.as_deref(),
+        start: args.start,
     };
+    let stage = Stage::new(&clips, &choice)?;
+    let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
+    let page = args
+        .viewer
+        .as_ref()
+        .map(|_| cast.page(&stage))
+        .transpose()?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{} cannot be created", args.out.display()))?;
     for figure in &figures {
@@ -96,12 +91,9 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         dataset.test.len(),
         dataset.digest
     );
-    replace_file(
-        &args.out.join("index.md"),
-        index(&figures, &about).as_bytes(),
-    )?;
+    replace_file(&args.out.join("index.md"), index(&figures, &about))?;
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
-        replace_file(path, page.as_bytes())?;
+        replace_file(path, page)?;
     }
     let mut out = std::io::stdout();
     for figure in &figures {

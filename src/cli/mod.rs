@@ -119,8 +119,6 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
 
 /// Whether the error is that what reads the output, such as `head`, has seen enough of it.
 fn output_is_closed(error: &anyhow::Error) -> bool {
-    let causes = error.chain().filter_map(|cause| cause.downcast_ref());
-    causes
-        .map(io::Error::kind)
-        .any(|kind| kind == io::ErrorKind::BrokenPipe)
+    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref());
+    causes.any(|cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe)
 }

@@ -133,7 +133,7 @@ fn resume_command(args: &TrainArgs) -> String {
     for set in &args.set {
         command += &format!(" --set {}", quote(set));
     }
-    if let Some(threads) = args.threads.given() {
+    if let Some(threads) = args.threads.threads {
         command += &format!(" --threads {threads}");
     }
     command + " --resume"
@@ -152,7 +152,7 @@ mod tests {
             budget: Some("budget.toml".into()),
             set: vec!["name=x".into(), "data.split={ share = 0.5 }".into()],
             resume: false,
-            threads: Threads::of(2),
+            threads: Threads { threads: Some(2) },
         };
         assert_eq!(
             resume_command(&args),
