@@ -11,7 +11,7 @@ use super::threads::Threads;
 use crate::data::Dataset;
 use crate::models::transition::DanceClip;
 use crate::report::figures::index;
-use crate::report::figures::pan2021::{Cast, Choice, Stage};
+use crate::report::figures::pan2021::{Cast, Stage};
 use crate::run::{Subject, replace_file};
 
 /// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
@@ -68,12 +68,8 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         cast.check_data(&dataset, &args.data)?;
     }
     let clips = DanceClip::measure_all(&dataset.test, &data.features())?;
-    let choice = Choice {
-        length: args.length.into(),
-        clip: args.clip.as_deref(),
-        start: args.start,
-    };
-    let stage = Stage::new(&clips, &choice)?;
+    let clip = args.clip.as_deref();
+    let stage = Stage::new(&clips, args.length.into(), clip, args.start)?;
     let figures = args.threads.pool()?.install(|| cast.figures(&stage))?;
     let page = args
         .viewer

@@ -11,7 +11,6 @@ pub mod demo;
 mod error;
 #[cfg(feature = "papers")]
 pub mod figures;
-pub mod loss_curve;
 pub mod motion_figure;
 pub mod root_panel;
 mod run_table;
@@ -19,18 +18,17 @@ mod schedule_note;
 mod score_figure;
 pub mod svg;
 mod thousands;
-pub mod validation_curve;
+pub mod training_curves;
 pub mod viewer;
 
 pub use error::FigureError;
 #[cfg(feature = "papers")]
 pub use error::ReportError;
-pub use loss_curve::{LossSeries, loss_curve};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};
 pub use run_table::RunTable;
 pub use schedule_note::{NO_TRAINING, schedule_note};
 pub use score_figure::{ScoreSeries, score_curve, score_figure};
 pub use thousands::thousands;
-pub use validation_curve::validation_curve;
+pub use training_curves::{LossSeries, loss_curve, validation_curve};
 pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};

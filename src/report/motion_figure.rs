@@ -212,12 +212,13 @@ impl MotionFigure {
                 return Err(empty("no frames"));
             }
             if self.placing == Placing::OnFirstPath && row.frames.len() != first.frames.len() {
-                return Err(FigureError::Frames {
-                    figure: self.title.clone(),
-                    row: row.label.clone(),
-                    found: row.frames.len(),
-                    expected: first.frames.len(),
-                });
+                let (found, expected) = (row.frames.len(), first.frames.len());
+                return Err(FigureError::frames(
+                    &self.title,
+                    &row.label,
+                    found,
+                    expected,
+                ));
             }
             let mut joints = row.frames.iter().flatten();
             if !(joints.all(|joint| joint.is_finite())

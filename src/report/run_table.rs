@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::thousands;
 use crate::evaluation::EvaluationRecord;
 use crate::experiment::ExperimentConfig;
-use crate::run::{RunError, RunFolder, RunProgress, RunStatus};
+use crate::run::{RunError, RunFolder, RunProgress, RunState};
 
 /// Folders inside folders that are looked through for runs.
 const DEEPEST: usize = 4;
@@ -193,12 +193,12 @@ fn state(
             None => "not begun",
         };
     };
-    match progress.status {
-        RunStatus::Running => "running",
-        RunStatus::Stopped => "stopped",
-        RunStatus::Interrupted => "interrupted",
-        RunStatus::Diverged => "diverged",
-        RunStatus::Finished if run.weights().exists() => "finished",
-        RunStatus::Finished => "finished, no weights",
+    match progress.manifest.state {
+        RunState::Running if progress.is_running => "running",
+        RunState::Running => "interrupted",
+        RunState::Stopped => "stopped",
+        RunState::Diverged => "diverged",
+        RunState::Finished if run.weights().exists() => "finished",
+        RunState::Finished => "finished, no weights",
     }
 }

@@ -18,5 +18,5 @@ pub use error::RunError;
 pub use folder::RunFolder;
 pub use log::LogLine;
 pub use manifest::{Manifest, RunState};
-pub use status::{RunProgress, RunStatus};
+pub use status::RunProgress;
 pub use subject::Subject;

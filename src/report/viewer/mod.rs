@@ -177,27 +177,19 @@ impl Viewer {
             let (contacts, factors) = (motion.contacts.len(), motion.velocity_factors.len());
             [motion.positions.len(), contacts, factors].map(|rows| (motion.name.as_str(), rows))
         });
-        let asked = self.asked.iter().flat_map(|asked| {
-            let (places, factors) = (asked.root_trajectory.len(), asked.velocity_factors.len());
-            [
-                ("the root trajectory", places),
-                ("the velocity factors", factors),
-            ]
-        });
+        let asked = self.asked.iter();
+        let places = asked.map(|asked| ("the root trajectory", asked.root_trajectory.len()));
+        let asked = self.asked.iter();
+        let factors = asked.map(|asked| ("the velocity factors", asked.velocity_factors.len()));
+        let asked = places.chain(factors);
         if let Some((row, found)) = motions.chain(asked).find(|(_, count)| *count != frames) {
-            return Err(FigureError::Frames {
-                figure: self.title.clone(),
-                row: row.into(),
-                found,
-                expected: frames,
-            });
+            return Err(FigureError::frames(&self.title, row, found, frames));
         }
         if let Some(keyframe) = self.keyframes.iter().find(|key| key.frame >= frames) {
-            return Err(FigureError::Keyframe {
-                figure: self.title.clone(),
-                frame: keyframe.frame,
-                frames,
-            });
+            return Err(FigureError::Unfit(format!(
+                "{:?}: keyframe {} lies outside its {frames} frames, which are numbered from 0",
+                self.title, keyframe.frame
+            )));
         }
         self.check_numbers()
     }
@@ -214,13 +206,10 @@ impl Viewer {
         if !self.keyframes.iter().all(|key| places(&key.positions)) {
             return Err(self.not_finite("a keyframe"));
         }
-        match &self.asked {
-            Some(asked)
-                if !(places(&asked.root_trajectory) && factors(&asked.velocity_factors)) =>
-            {
-                Err(self.not_finite("what was asked for"))
-            }
-            _ => Ok(()),
+        let mut asked = self.asked.iter();
+        match asked.all(|it| places(&it.root_trajectory) && factors(&it.velocity_factors)) {
+            true => Ok(()),
+            false => Err(self.not_finite("what was asked for")),
         }
     }
 

@@ -7,7 +7,7 @@ mod stage;
 mod velocity;
 mod wording;
 
-pub use stage::{Choice, Stage, Window};
+pub use stage::{Stage, Window};
 
 use std::path::Path;
 
