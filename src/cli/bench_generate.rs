@@ -27,7 +27,8 @@ pub struct BenchGenerateArgs {
     json: bool,
 }
 
-/// Times the generation of transitions of 60 frames by the paper's whole model, without a tape that records.
+/// Times the generation of transitions of 60 frames by the paper's whole model, without a tape that
+/// records.
 ///
 /// # Errors
 /// No threads to be had.

@@ -1,4 +1,5 @@
-//! `keydance bench-layers`: how fast an LSTM and two Transformer encoder layers are on this machine.
+//! `keydance bench-layers`: how fast an LSTM and two Transformer encoder layers are on this
+//! machine.
 
 use std::io::Write as _;
 

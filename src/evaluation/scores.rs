@@ -10,7 +10,8 @@ pub const AVERAGE: &str = "avg";
 /// The key of the numbers of windows among those of metrics.
 const WINDOWS: &str = "windows";
 
-/// One metric's score in each column of its table, such as a transition length and the mean over all: `{"10": .., "avg": ..}`.
+/// One metric's score in each column of its table, such as a transition length and the mean over
+/// all: `{"10": .., "avg": ..}`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ScoreRow {
@@ -56,8 +57,8 @@ impl ScoreRow {
     }
 }
 
-/// The scores of a model by a protocol, a row a metric, and how many windows stand behind each column, as written to JSON:
-/// `{"lrp": {"10": .., "avg": ..}, .., "windows": {"10": ..}}`.
+/// The scores of a model by a protocol, a row a metric, and how many windows stand behind each
+/// column, as written to JSON: `{"lrp": {"10": .., "avg": ..}, .., "windows": {"10": ..}}`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Scores {
     #[serde(flatten, serialize_with = "as_map")]

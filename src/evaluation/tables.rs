@@ -1,4 +1,5 @@
-//! A paper's tables with our scores beside its own: as Markdown, and as plain text for the terminal.
+//! A paper's tables with our scores beside its own: as Markdown, and as plain text for the
+//! terminal.
 
 use std::collections::BTreeSet;
 
@@ -14,8 +15,8 @@ pub struct TableRow {
     pub seed: Option<u64>,
     /// None where it is not trained yet: the row stands there all the same.
     pub scores: Option<Scores>,
-    /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6 frame-steps"; "not trained" for
-    /// interpolation.
+    /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6
+    /// frame-steps"; "not trained" for interpolation.
     pub schedule_note: String,
 }
 
@@ -30,11 +31,13 @@ pub struct Tables<'a> {
 }
 
 impl Tables<'_> {
-    /// The paper's tables in Markdown: for each model the paper's value, ours and the difference (ours minus the paper's).
+    /// The paper's tables in Markdown: for each model the paper's value, ours and the difference
+    /// (ours minus the paper's).
     ///
-    /// All rows of the paper are there, in its order, then our models that it does not have. Rows of one model that differ in
-    /// their seed only have their mean, standard deviation and range too; a row without scores has "—" in every cell. `subject`
-    /// says in the caption what ours were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
+    /// All rows of the paper are there, in its order, then our models that it does not have. Rows
+    /// of one model that differ in their seed only have their mean, standard deviation and range
+    /// too; a row without scores has "—" in every cell. `subject` says in the caption what ours
+    /// were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
     /// the paper's, they are ours and their mean is not compared.
     pub fn markdown(&self, rows: &[TableRow], subject: &str) -> String {
         let tables: Vec<String> = self
@@ -45,7 +48,8 @@ impl Tables<'_> {
         tables.join("\n")
     }
 
-    /// The metrics that have a table, with its number in the paper: all where the paper prints none.
+    /// The metrics that have a table, with its number in the paper: all where the paper prints
+    /// none.
     fn tables(&self) -> Vec<(Option<u32>, &Metric)> {
         if self.printed.tables.is_empty() {
             return self.metrics.iter().map(|metric| (None, metric)).collect();
@@ -191,8 +195,8 @@ impl Tables<'_> {
         notes
     }
 
-    /// The scores as plain text, for the terminal: a block for each metric, a line for each model, at last the numbers of
-    /// windows.
+    /// The scores as plain text, for the terminal: a block for each metric, a line for each model,
+    /// at last the numbers of windows.
     ///
     /// The paper's values stand under ours where it has them and the columns are its own.
     pub fn terminal(&self, rows: &[TableRow]) -> String {
@@ -241,7 +245,8 @@ impl Tables<'_> {
         out
     }
 
-    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there are no rows.
+    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there
+    /// are no rows.
     fn columns(&self, rows: &[TableRow]) -> Vec<String> {
         let scores = rows.iter().filter_map(|row| row.scores.as_ref());
         let rows = scores.flat_map(Scores::rows);
@@ -329,7 +334,8 @@ impl Spread {
     }
 }
 
-/// A model in the tables: the paper's row and ours by its name (more than one where it was trained more than once).
+/// A model in the tables: the paper's row and ours by its name (more than one where it was trained
+/// more than once).
 struct Group<'a> {
     title: String,
     paper: Option<&'a PrintedRow>,

@@ -11,7 +11,8 @@ use crate::autograd::check::{CheckReport, ParameterReport};
 const TOLERANCE: f64 = 1e-5;
 /// Largest share of numbers that may stand at a kink.
 const MOST_KINKS: f64 = 0.02;
-/// A check of each case that the model has; its `Display` is a table for each and a line on them all.
+/// A check of each case that the model has; its `Display` is a table for each and a line on them
+/// all.
 pub struct GradientReport {
     /// Title and report.
     cases: Vec<(String, CheckReport)>,

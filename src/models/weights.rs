@@ -1,7 +1,8 @@
-//! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32, the statistics that the
-//! model needs beside them, and the config.
+//! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32,
+//! the statistics that the model needs beside them, and the config.
 //!
-//! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program that wrote the file).
+//! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program
+//! that wrote the file).
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Debug;
@@ -178,14 +179,16 @@ impl SavedWeights {
         }
     }
 
-    /// Most weights that a model may have to be built for these: not many more than there are, as the sizes in a file cannot be
-    /// trusted; but some, so that a parameter which the file lacks is named.
+    /// Most weights that a model may have to be built for these: not many more than there are, as
+    /// the sizes in a file cannot be trusted; but some, so that a parameter which the file lacks is
+    /// named.
     pub fn most_weights(&self) -> usize {
         let weights: usize = self.arrays.values().map(ArrayD::len).sum();
         2 * weights + (1 << 20)
     }
 
-    /// Puts the values into a model's parameters and buffers. `statistics` are what else the file may hold.
+    /// Puts the values into a model's parameters and buffers. `statistics` are what else the file
+    /// may hold.
     ///
     /// # Errors
     /// The file and the model do not have the same names and shapes; then nothing is changed.

@@ -1,7 +1,8 @@
 //! The motion viewer: motions in 3D as one HTML page that opens from disk and needs no network.
 //!
-//! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as JSON. Nothing that a user wrote becomes
-//! markup: names are escaped in the page's title, and inside the JSON no `<` is left that could end its element.
+//! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as
+//! JSON. Nothing that a user wrote becomes markup: names are escaped in the page's title, and
+//! inside the JSON no `<` is left that could end its element.
 
 #[cfg(feature = "papers")]
 mod generated;
@@ -51,7 +52,8 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame. Panics on fewer columns.
+    /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame.
+    /// Panics on fewer columns.
     pub fn new(root_trajectory: ArrayView2<f64>, velocity_factors: ArrayView2<f64>) -> Self {
         let factors = |row: ArrayView1<f64>| std::array::from_fn(|part| row[part]);
         Self {
@@ -95,7 +97,8 @@ pub struct ViewerKeyframe {
 }
 
 impl ViewerMotion {
-    /// A motion from its frames' numbers, `[frames, 149 or 154]`, not standardised. Velocity factors are measured on the positions.
+    /// A motion from its frames' numbers, `[frames, 149 or 154]`, not standardised. Velocity
+    /// factors are measured on the positions.
     pub fn from_features(
         name: impl Into<String>,
         kind: MotionKind,
@@ -115,7 +118,8 @@ impl Viewer {
     /// The page.
     ///
     /// # Errors
-    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a keyframe outside, a NaN or infinity.
+    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a
+    /// keyframe outside, a NaN or infinity.
     pub fn html(&self) -> Result<String, FigureError> {
         self.check()?;
         let frames = self.frames();

@@ -132,7 +132,8 @@ impl Cast {
         Ok(Viewer::of_request(&window.describe(), &window.request, motions).html()?)
     }
 
-    /// Name, whether it was trained, and model: interpolation unless it is among those given, then those to set beside.
+    /// Name, whether it was trained, and model: interpolation unless it is among those given, then
+    /// those to set beside.
     fn others(&self) -> Vec<(&str, bool, &dyn Generator)> {
         let mut given = self.compared.iter().chain([&self.subject]);
         let mut models: Vec<(&str, bool, &dyn Generator)> = Vec::new();
