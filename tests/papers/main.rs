@@ -24,3 +24,4 @@ mod synthesis;
 mod tables;
 mod training;
 mod velocity_refinement;
+mod wording;
