@@ -1,4 +1,5 @@
-//! `keydance choreography`: writes generated dance clips as BVH files, for whoever has no motion capture.
+//! `keydance choreography`: writes generated dance clips as BVH files, for whoever has no motion
+//! capture.
 
 use std::io::Write as _;
 use std::path::PathBuf;

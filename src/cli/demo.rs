@@ -15,7 +15,7 @@ use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset, Recording};
-use crate::evaluation::{Scores, Tables};
+use crate::evaluation::Tables;
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 use crate::models::baselines::interpolation::Interpolation;
@@ -80,10 +80,9 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     };
     let pool = args.threads.pool()?;
     let protocol = config.protocol();
-    let evaluate = |model: &dyn Generator| -> anyhow::Result<Scores> {
-        let evaluated =
-            pool.install(|| evaluate_watched(&*protocol, model, &dataset, DataPart::Test))?;
-        Ok(evaluated.scores)
+    let evaluate = |model: &dyn Generator| {
+        pool.install(|| evaluate_watched(&*protocol, model, &dataset, DataPart::Test))
+            .map(|evaluated| evaluated.scores)
     };
     let comparison = Comparison {
         interpolation: evaluate(&interpolation)?,
@@ -92,20 +91,10 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     };
     let manifest = run.manifest()?.context("the training left no manifest")?;
     let rows = comparison.rows(config, &manifest);
-    let printed = config.printed()?;
-    let tables = Tables {
-        metrics: protocol.metrics(),
-        printed: &printed,
-    };
+    let (metrics, printed) = (protocol.metrics(), &config.printed()?);
+    let tables = Tables { metrics, printed };
     write!(out, "\n{}\n", tables.terminal(&rows))?;
-    demo::write_scores(
-        run.path(),
-        &settings,
-        &dataset,
-        &comparison,
-        &printed,
-        &rows,
-    )?;
+    demo::write_scores(run.path(), &settings, &dataset, &comparison, tables, &rows)?;
 
     let clips = DanceClip::measure_all(&dataset.test, &config.data.features())?;
     let showcase = Showcase::new(&clips)?;
@@ -117,21 +106,17 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
         motion.mean_error,
         motion.max_error
     )?;
-    writeln!(
-        out,
-        "{} in {:.0} s",
-        run.path().display(),
-        begun.elapsed().as_secs_f64()
-    )?;
+    let seconds = begun.elapsed().as_secs_f64();
+    writeln!(out, "{} in {seconds:.0} s", run.path().display())?;
     writeln!(out, "{comparison}")?;
     if comparison.is_ahead() {
-        Ok(ExitCode::SUCCESS)
-    } else {
-        notice(
-            "error: the trained model is not ahead of interpolation and of its own beginning at long transitions",
-        );
-        Ok(ExitCode::from(BEHIND))
+        return Ok(ExitCode::SUCCESS);
     }
+    notice(
+        "error: the trained model is not ahead of interpolation and of its own beginning at long \
+         transitions",
+    );
+    Ok(ExitCode::from(BEHIND))
 }
 
 /// Trains to the end of the schedule and shows the progress on stderr. The model with its initial

@@ -73,10 +73,9 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     )?;
     let config = &subject.config;
     let protocol = config.model.protocol(&config.data, &args.options());
-    let evaluation = args
-        .threads
-        .pool()?
-        .install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
+    let pool = args.threads.pool()?;
+    let evaluation =
+        pool.install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
     for warning in &evaluation.warnings {
         notice(format_args!("warning: {warning}"));
     }
@@ -86,11 +85,8 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         scores: Some(evaluation.scores.clone()),
         schedule_note: String::new(),
     };
-    let tables = Tables {
-        metrics: protocol.metrics(),
-        printed: &config.printed()?,
-    };
-    write!(out, "{}", tables.terminal(&[row]))?;
+    let (metrics, printed) = (protocol.metrics(), &config.printed()?);
+    write!(out, "{}", Tables { metrics, printed }.terminal(&[row]))?;
     let record = EvaluationRecord {
         scores: evaluation.scores,
         data,

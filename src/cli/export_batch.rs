@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, bail};
 use clap::Args;
 
 use crate::data::Dataset;
@@ -50,16 +50,13 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
             false => Feed::Predictions,
         },
     };
-    let file =
-        export_batch(&model, settings.model.root_frame(), &clips, &batch).map_err(|error| {
-            match error {
-                ExportError::TooShort { frames } => anyhow!(
-                    "no training clip of {} has the {} frames that --frames {frames} needs",
-                    args.data.display(),
-                    frames + 1
-                ),
-                other => other.into(),
-            }
-        })?;
-    Ok(replace_file(&args.out, &file)?)
+    match export_batch(&model, settings.model.root_frame(), &clips, &batch) {
+        Ok(file) => Ok(replace_file(&args.out, &file)?),
+        Err(ExportError::TooShort { frames }) => bail!(
+            "no training clip of {} has the {} frames that --frames {frames} needs",
+            args.data.display(),
+            frames + 1
+        ),
+        Err(other) => Err(other.into()),
+    }
 }

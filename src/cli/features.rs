@@ -23,7 +23,8 @@ pub struct FeaturesArgs {
 }
 
 /// # Errors
-/// A file cannot be read, or the clip does not go onto the dance skeleton; nothing is written then. The array cannot be written.
+/// A file cannot be read, or the clip does not go onto the dance skeleton; nothing is written then.
+/// The array cannot be written.
 pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
     let mapping = args.mapping.as_deref().map(Mapping::read).transpose()?;
     let clip = bvh::read(&args.file)?.to_clip();

@@ -96,12 +96,9 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         dataset.test.len(),
         dataset.digest
     );
-    replace_file(
-        &args.out.join("index.md"),
-        index(&figures, &about).as_bytes(),
-    )?;
+    replace_file(&args.out.join("index.md"), index(&figures, &about))?;
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
-        replace_file(path, page.as_bytes())?;
+        replace_file(path, page)?;
     }
     let mut out = std::io::stdout();
     for figure in &figures {

@@ -68,10 +68,9 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let request = keyframes.request(&args.keyframes.length)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
     let request = args.velocity.apply(request, &keyframes)?;
-    let ranges = match &subject.run {
-        Some(run) => DataRanges::of_run(run, &subject.config)?,
-        None => None,
-    };
+    let run = subject.run.as_ref();
+    let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
+    let ranges = ranges.transpose()?.flatten();
     warnings.extend(control_warnings(&request, ranges.as_ref()));
     for warning in &warnings {
         notice(format_args!("warning: {warning}"));
@@ -82,15 +81,11 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let name = args.out.file_name().unwrap_or_default().to_string_lossy();
     let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
     let document = document(&sequence.clip, keyframes.channels())?;
-    let page = match &args.viewer {
-        Some(_) => Some(generated_page(
-            &subject, &keyframes, &request, &sequence, &options,
-        )?),
-        None => None,
-    };
+    let page = || generated_page(&subject, &keyframes, &request, &sequence, &options);
+    let page = args.viewer.as_ref().map(|_| page()).transpose()?;
     bvh::write(&args.out, &document)?;
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
-        replace_file(path, page.as_bytes())?;
+        replace_file(path, page)?;
     }
     let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
     if let Some(path) = &args.json {

@@ -1,8 +1,6 @@
 //! The command line: one file a subcommand.
 
-mod bench_generate;
-mod bench_layers;
-mod bench_step;
+mod bench;
 mod bvh;
 mod choreography;
 mod clip_choice;
@@ -69,11 +67,11 @@ enum Command {
     /// Write a batch with a trained model's outputs, losses and gradients
     ExportBatch(export_batch::ExportBatchArgs),
     /// Time a training step
-    BenchStep(bench_step::BenchStepArgs),
+    BenchStep(bench::StepArgs),
     /// Time an LSTM and two Transformer encoder layers, forward and backward
-    BenchLayers(bench_layers::BenchLayersArgs),
+    BenchLayers(bench::LayersArgs),
     /// Time the generation of frames
-    BenchGenerate(bench_generate::BenchGenerateArgs),
+    BenchGenerate(bench::GenerateArgs),
 }
 
 impl Cli {
@@ -97,9 +95,9 @@ impl Cli {
             Command::Features(args) => features::run(args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
-            Command::BenchStep(args) => bench_step::run(args)?,
-            Command::BenchLayers(args) => bench_layers::run(args)?,
-            Command::BenchGenerate(args) => bench_generate::run(args)?,
+            Command::BenchStep(args) => bench::step(args)?,
+            Command::BenchLayers(args) => bench::layers(args)?,
+            Command::BenchGenerate(args) => bench::generate(args)?,
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -119,8 +117,6 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
 
 /// Whether the error is that what reads the output, such as `head`, has seen enough of it.
 fn output_is_closed(error: &anyhow::Error) -> bool {
-    let causes = error.chain().filter_map(|cause| cause.downcast_ref());
-    causes
-        .map(io::Error::kind)
-        .any(|kind| kind == io::ErrorKind::BrokenPipe)
+    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref());
+    causes.any(|cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe)
 }

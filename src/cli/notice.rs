@@ -3,7 +3,8 @@
 use std::fmt::Display;
 use std::io::{self, Write as _};
 
-/// Writes a line to stderr. Where nobody reads it any more, the command goes on: a training is worth more than its progress lines.
+/// Writes a line to stderr. Where nobody reads it any more, the command goes on: a training is
+/// worth more than its progress lines.
 pub fn notice(line: impl Display) {
     let _ = writeln!(io::stderr(), "{line}");
 }

@@ -40,7 +40,8 @@ impl Progress {
         progress
     }
 
-    /// Lines that begin with a name, for a training that is not the only one; `before` as in [`Progress::new`].
+    /// Lines that begin with a name, for a training that is not the only one; `before` as in
+    /// [`Progress::new`].
     pub fn lines(name: String, task: &dyn Task<f32>, before: u64) -> Self {
         Self {
             bar: None,

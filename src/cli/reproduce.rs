@@ -136,9 +136,11 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Ending::Stopped => {
+            // The command as it was given.
+            let words = std::env::args().skip(1).map(|word| quote(&word));
+            let command = words.collect::<Vec<_>>().join(" ");
             notice(format_args!(
-                "stopped and saved; go on with\n  {}",
-                same_command()
+                "stopped and saved; go on with\n  keydance {command}"
             ));
             Ok(interrupted())
         }
@@ -204,10 +206,4 @@ impl Observer for Terminal {
     fn stop_asked(&self) -> bool {
         self.stop.is_asked()
     }
-}
-
-/// The command as it was given.
-fn same_command() -> String {
-    let words = std::env::args().skip(1).map(|word| quote(&word));
-    format!("keydance {}", words.collect::<Vec<_>>().join(" "))
 }

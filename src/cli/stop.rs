@@ -16,7 +16,8 @@ const INTERRUPTED: u8 = 130;
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Set by Ctrl-C or SIGTERM; the second time ends the process at once, which loses the steps since the last checkpoint only.
+    /// Set by Ctrl-C or SIGTERM; the second time ends the process at once, which loses the steps
+    /// since the last checkpoint only.
     ///
     /// # Errors
     /// The signals cannot be caught. A process does so once.

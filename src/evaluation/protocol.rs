@@ -16,11 +16,12 @@ pub trait Protocol: Send + Sync {
         &[]
     }
 
-    /// Frames of all requests that a model will be asked on recordings of these numbers of frames: how far an evaluation has
-    /// to go.
+    /// Frames of all requests that a model will be asked on recordings of these numbers of frames:
+    /// how far an evaluation has to go.
     fn frames(&self, recordings: &[usize]) -> u64;
 
-    /// Scores a model on a part of the data. The scores are the same to the bit on any number of threads.
+    /// Scores a model on a part of the data. The scores are the same to the bit on any number of
+    /// threads.
     ///
     /// # Errors
     /// Data without a window, or a model that fails or gives something that does not fit.

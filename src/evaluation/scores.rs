@@ -3,7 +3,6 @@
 use std::fmt;
 
 use serde::de::{Error as _, MapAccess, Visitor};
-use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The column of a mean over the others.
@@ -11,9 +10,12 @@ pub const AVERAGE: &str = "avg";
 /// The key of the numbers of windows among those of metrics.
 const WINDOWS: &str = "windows";
 
-/// One metric's score in each column of its table, such as a transition length and the mean over all: `{"10": .., "avg": ..}`.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// One metric's score in each column of its table, such as a transition length and the mean over
+/// all: `{"10": .., "avg": ..}`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct ScoreRow {
+    #[serde(serialize_with = "as_map", deserialize_with = "in_order")]
     columns: Vec<(String, f64)>,
 }
 
@@ -55,12 +57,14 @@ impl ScoreRow {
     }
 }
 
-/// The scores of a model by a protocol, a row a metric, and how many windows stand behind each column, as written to JSON:
-/// `{"lrp": {"10": .., "avg": ..}, .., "windows": {"10": ..}}`.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// The scores of a model by a protocol, a row a metric, and how many windows stand behind each
+/// column, as written to JSON: `{"lrp": {"10": .., "avg": ..}, .., "windows": {"10": ..}}`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Scores {
+    #[serde(flatten, serialize_with = "as_map")]
     rows: Vec<(String, ScoreRow)>,
     /// Number of windows of each column that has its own.
+    #[serde(serialize_with = "as_map")]
     windows: Vec<(String, usize)>,
 }
 
@@ -103,13 +107,12 @@ impl Scores {
     }
 }
 
-/// A map in its own order.
-struct InOrder<'a, V>(&'a [(String, V)]);
-
-impl<V: Serialize> Serialize for InOrder<'_, V> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
-    }
+/// Writes a map in its own order.
+fn as_map<V: Serialize, S: Serializer>(
+    entries: &[(String, V)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
 }
 
 /// Reads a map and keeps its order.
@@ -131,30 +134,6 @@ fn in_order<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
         }
     }
     deserializer.deserialize_map(Entries(std::marker::PhantomData))
-}
-
-impl Serialize for ScoreRow {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        InOrder(&self.columns).serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for ScoreRow {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let columns = in_order(deserializer)?;
-        Ok(Self { columns })
-    }
-}
-
-impl Serialize for Scores {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.rows.len() + 1))?;
-        for (key, row) in &self.rows {
-            map.serialize_entry(key, row)?;
-        }
-        map.serialize_entry(WINDOWS, &InOrder(&self.windows))?;
-        map.end()
-    }
 }
 
 impl<'de> Deserialize<'de> for Scores {

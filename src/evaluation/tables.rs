@@ -1,4 +1,5 @@
-//! A paper's tables with our scores beside its own: as Markdown, and as plain text for the terminal.
+//! A paper's tables with our scores beside its own: as Markdown, and as plain text for the
+//! terminal.
 
 use std::collections::BTreeSet;
 
@@ -14,8 +15,8 @@ pub struct TableRow {
     pub seed: Option<u64>,
     /// None where it is not trained yet: the row stands there all the same.
     pub scores: Option<Scores>,
-    /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6 frame-steps"; "not trained" for
-    /// interpolation.
+    /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6
+    /// frame-steps"; "not trained" for interpolation.
     pub schedule_note: String,
 }
 
@@ -30,11 +31,13 @@ pub struct Tables<'a> {
 }
 
 impl Tables<'_> {
-    /// The paper's tables in Markdown: for each model the paper's value, ours and the difference (ours minus the paper's).
+    /// The paper's tables in Markdown: for each model the paper's value, ours and the difference
+    /// (ours minus the paper's).
     ///
-    /// All rows of the paper are there, in its order, then our models that it does not have. Rows of one model that differ in
-    /// their seed only have their mean, standard deviation and range too; a row without scores has "—" in every cell. `subject`
-    /// says in the caption what ours were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
+    /// All rows of the paper are there, in its order, then our models that it does not have. Rows
+    /// of one model that differ in their seed only have their mean, standard deviation and range
+    /// too; a row without scores has "—" in every cell. `subject` says in the caption what ours
+    /// were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
     /// the paper's, they are ours and their mean is not compared.
     pub fn markdown(&self, rows: &[TableRow], subject: &str) -> String {
         let tables: Vec<String> = self
@@ -45,7 +48,8 @@ impl Tables<'_> {
         tables.join("\n")
     }
 
-    /// The metrics that have a table, with its number in the paper: all where the paper prints none.
+    /// The metrics that have a table, with its number in the paper: all where the paper prints
+    /// none.
     fn tables(&self) -> Vec<(Option<u32>, &Metric)> {
         if self.printed.tables.is_empty() {
             return self.metrics.iter().map(|metric| (None, metric)).collect();
@@ -67,30 +71,21 @@ impl Tables<'_> {
         subject: &str,
     ) -> String {
         let columns = self.columns(rows);
-        let mut header = vec!["Model".to_string(), String::new()];
-        header.extend(columns.iter().map(|column| column_title(column, "N = ")));
-        let mut rule = vec!["---".to_string(); 2];
-        rule.resize(header.len(), "---:".into());
-        let mut lines = vec![header, rule];
-
-        for group in self.groups(rows) {
-            let paper = group
-                .paper
-                .filter(|paper| paper.values.contains_key(metric.key));
-            let mut title = group.title.clone();
-            for (kind, cells) in self.group_lines(&group, metric, paper, &columns) {
-                let mut line = vec![std::mem::take(&mut title), kind];
-                line.extend(cells);
-                lines.push(line);
-            }
-        }
-
         let mut out = match number {
             Some(number) => format!("## Table {number}: {}\n\n", metric.title),
             None => format!("## {}\n\n", metric.title),
         };
-        for line in lines {
-            out += &format!("| {} |\n", line.join(" | "));
+        let mut add = |title: &str, kind: &str, cells: &[String]| {
+            out += &format!("| {title} | {kind} | {} |\n", cells.join(" | "));
+        };
+        let titles: Vec<String> = columns.iter().map(|it| column_title(it, "N = ")).collect();
+        add("Model", "", &titles);
+        add("---", "---", &vec!["---:".into(); columns.len()]);
+        for group in self.groups(rows) {
+            let mut title = group.title.as_str();
+            for (kind, cells) in self.group_lines(&group, metric, &columns) {
+                add(std::mem::take(&mut title), &kind, &cells);
+            }
         }
         let (about, better) = (metric.about, metric.better.title());
         out += &format!("\n{}: {about}; {better}. ", metric.title);
@@ -112,10 +107,10 @@ impl Tables<'_> {
         &self,
         group: &Group<'_>,
         metric: &Metric,
-        paper: Option<&PrintedRow>,
         columns: &[String],
     ) -> Vec<(String, Vec<String>)> {
-        let paper = paper.map(|row| -> Vec<Option<f64>> {
+        let prints = |row: &&PrintedRow| row.values.contains_key(metric.key);
+        let paper = group.paper.filter(prints).map(|row| -> Vec<Option<f64>> {
             let known = &self.printed.columns;
             let value = |column: &String| row.value(metric.key, known, column);
             columns.iter().map(value).collect()
@@ -150,41 +145,33 @@ impl Tables<'_> {
                 lines.push(("difference".into(), difference.unwrap_or_else(absent)));
             }
         }
-        if by_seed {
-            let measured: Vec<(&TableRow, Vec<Option<f64>>)> = group
-                .ours
-                .iter()
-                .filter_map(|row| Some((*row, scores(row)?)))
-                .collect();
-            let spreads: Vec<Option<Spread>> = (0..columns.len())
-                .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
-                .collect();
-            let shown = |text: &dyn Fn(&Spread) -> String| -> Vec<String> {
-                let cell = |spread: &Option<Spread>| spread.as_ref().map(text);
-                spreads
-                    .iter()
-                    .map(|spread| cell(spread).unwrap_or(ABSENT.into()))
-                    .collect()
-            };
-            lines.push((
-                "ours, mean ± sd".into(),
-                shown(&|s| format!("{:.2} ± {:.2}", s.mean, s.deviation)),
-            ));
-            lines.push((
-                "ours, min to max".into(),
-                shown(&|s| format!("{:.2} to {:.2}", s.least, s.most)),
-            ));
-            if paper.is_some() {
-                let means: Vec<Option<f64>> = spreads
-                    .iter()
-                    .map(|spread| spread.as_ref().map(|spread| spread.mean))
-                    .collect();
-                let difference = measured
-                    .first()
-                    .and_then(|(row, _)| compared(&means, row))
-                    .unwrap_or_else(absent);
-                lines.push(("difference of the mean".into(), difference));
-            }
+        if !by_seed {
+            return lines;
+        }
+        let measured = group.ours.iter();
+        let measured: Vec<(&TableRow, Vec<Option<f64>>)> = measured
+            .filter_map(|row| Some((*row, scores(row)?)))
+            .collect();
+        let spreads: Vec<Option<Spread>> = (0..columns.len())
+            .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
+            .collect();
+        let mut add = |kind: &str, text: &dyn Fn(&Spread) -> String| {
+            let spreads = spreads.iter().map(Option::as_ref);
+            let cells = spreads.map(|spread| spread.map_or(ABSENT.into(), text));
+            lines.push((kind.into(), cells.collect()));
+        };
+        add("ours, mean ± sd", &|it| {
+            format!("{:.2} ± {:.2}", it.mean, it.deviation)
+        });
+        add("ours, min to max", &|it| {
+            format!("{:.2} to {:.2}", it.least, it.most)
+        });
+        if paper.is_some() {
+            let means = spreads.iter().map(|spread| Some(spread.as_ref()?.mean));
+            let means: Vec<Option<f64>> = means.collect();
+            let of_first = measured.first().and_then(|(row, _)| compared(&means, row));
+            let cells = of_first.unwrap_or_else(absent);
+            lines.push(("difference of the mean".into(), cells));
         }
         lines
     }
@@ -198,10 +185,8 @@ impl Tables<'_> {
                     Some(seed) => format!("{} (seed {seed})", group.title),
                     None => group.title.clone(),
                 };
-                match notes
-                    .iter_mut()
-                    .find(|(note, _)| *note == row.schedule_note)
-                {
+                let mut known = notes.iter_mut();
+                match known.find(|(note, _)| *note == row.schedule_note) {
                     Some((_, models)) => models.push(model),
                     None => notes.push((&row.schedule_note, vec![model])),
                 }
@@ -210,8 +195,8 @@ impl Tables<'_> {
         notes
     }
 
-    /// The scores as plain text, for the terminal: a block for each metric, a line for each model, at last the numbers of
-    /// windows.
+    /// The scores as plain text, for the terminal: a block for each metric, a line for each model,
+    /// at last the numbers of windows.
     ///
     /// The paper's values stand under ours where it has them and the columns are its own.
     pub fn terminal(&self, rows: &[TableRow]) -> String {
@@ -231,10 +216,8 @@ impl Tables<'_> {
             .collect();
         let mut out = String::new();
         for metric in self.metrics {
-            if measured
-                .iter()
-                .all(|(_, scores)| scores.row(metric.key).is_none())
-            {
+            let mut rows = measured.iter().map(|(_, scores)| scores.row(metric.key));
+            if rows.all(|row| row.is_none()) {
                 continue;
             }
             out += &line(&block_title(metric), &header);
@@ -262,14 +245,13 @@ impl Tables<'_> {
         out
     }
 
-    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there are no rows.
+    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there
+    /// are no rows.
     fn columns(&self, rows: &[TableRow]) -> Vec<String> {
-        let mut columns: Vec<String> = Vec::new();
         let scores = rows.iter().filter_map(|row| row.scores.as_ref());
-        for column in scores
-            .flat_map(Scores::rows)
-            .flat_map(|(_, row)| row.columns())
-        {
+        let rows = scores.flat_map(Scores::rows);
+        let mut columns: Vec<String> = Vec::new();
+        for column in rows.flat_map(|(_, row)| row.columns()) {
             if !columns.iter().any(|known| known == column) {
                 columns.push(column.into());
             }
@@ -295,10 +277,8 @@ impl Tables<'_> {
                 ours: rows.iter().filter(|row| row.name == paper.name).collect(),
             })
             .collect();
-        for row in rows
-            .iter()
-            .filter(|row| self.printed.row(&row.name).is_none())
-        {
+        let ours_alone = |row: &&TableRow| self.printed.row(&row.name).is_none();
+        for row in rows.iter().filter(ours_alone) {
             match groups.iter_mut().find(|group| group.title == row.name) {
                 Some(group) => group.ours.push(row),
                 None => groups.push(Group {
@@ -354,7 +334,8 @@ impl Spread {
     }
 }
 
-/// A model in the tables: the paper's row and ours by its name (more than one where it was trained more than once).
+/// A model in the tables: the paper's row and ours by its name (more than one where it was trained
+/// more than once).
 struct Group<'a> {
     title: String,
     paper: Option<&'a PrintedRow>,
@@ -392,12 +373,10 @@ fn difference(
 ) -> Vec<Option<f64>> {
     let pairs = ours.iter().zip(paper).zip(columns);
     pairs
-        .map(
-            |((ours, paper), column)| match same_columns || column != AVERAGE {
-                true => ours.zip(*paper).map(|(ours, paper)| ours - paper),
-                false => None,
-            },
-        )
+        .map(|((ours, paper), column)| {
+            let compared = same_columns || column != AVERAGE;
+            ours.filter(|_| compared).zip(*paper).map(|(a, b)| a - b)
+        })
         .collect()
 }
 

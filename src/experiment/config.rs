@@ -1,4 +1,5 @@
-//! An experiment's config: what is trained, on what, how. What concerns one model alone is the model's own.
+//! An experiment's config: what is trained, on what, how. What concerns one model alone is the
+//! model's own.
 
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +94,8 @@ impl Default for LogConfig {
     }
 }
 
-/// When a training scores itself on the clips that `data.validation_share` sets aside, and on how many windows.
+/// When a training scores itself on the clips that `data.validation_share` sets aside, and on how
+/// many windows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidationConfig {

@@ -1,4 +1,5 @@
-//! Configs from files: small overrides on a base, overrides of the command line on top, unknown keys refused.
+//! Configs from files: small overrides on a base, overrides of the command line on top, unknown
+//! keys refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -38,17 +39,19 @@ struct Layer {
 }
 
 impl ExperimentConfig {
-    /// Reads a TOML file. A top-level key `base` names another file, relative to this one, that it overrides; keys that no file
-    /// names have the paper's values. `sets` are overrides `a.b.c=value` on top: a value is TOML, a bare word is a string.
+    /// Reads a TOML file. A top-level key `base` names another file, relative to this one, that it
+    /// overrides; keys that no file names have the paper's values. `sets` are overrides
+    /// `a.b.c=value` on top: a value is TOML, a bare word is a string.
     ///
     /// # Errors
-    /// A file cannot be read or is not TOML; a key is unknown or has a value of the wrong kind or range (the file or override
-    /// that says so is named); a file is its own base.
+    /// A file cannot be read or is not TOML; a key is unknown or has a value of the wrong kind or
+    /// range (the file or override that says so is named); a file is its own base.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         Self::load_under(path, None, sets)
     }
 
-    /// The same with a budget between the file and `sets`: a file of overrides that any experiment can be under.
+    /// The same with a budget between the file and `sets`: a file of overrides that any experiment
+    /// can be under.
     ///
     /// # Errors
     /// As [`ExperimentConfig::load`].
@@ -128,7 +131,8 @@ impl ExperimentConfig {
             .collect())
     }
 
-    /// The differences that a training would notice: all but those of keys that act after the network.
+    /// The differences that a training would notice: all but those of keys that act after the
+    /// network.
     ///
     /// # Errors
     /// A number that TOML does not have.
@@ -239,7 +243,8 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
     })
 }
 
-/// Merges the layers onto the defaults and checks after each, so that an error names the layer that brought it.
+/// Merges the layers onto the defaults and checks after each, so that an error names the layer that
+/// brought it.
 fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     let mut kind = registry::kinds().into_iter().next().ok_or_else(no_kinds)?;
     let mut table = Table::try_from(Shared::default())?;
@@ -276,7 +281,8 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
         let origin = layer.map_or("the defaults", |(origin, _)| origin);
         ConfigError::Refused(format!("{origin}: {cause}"))
     })?;
-    // A budget is over any model; what it says of a part that this one lacks makes no other experiment of it.
+    // A budget is over any model; what it says of a part that this one lacks makes no other
+    // experiment of it.
     let groups = config.model.rate_groups();
     config
         .optimiser
@@ -346,7 +352,8 @@ fn parse_layer(
         log,
         validation,
     };
-    // A model without fields takes any key without a word: what does not come back out was not understood.
+    // A model without fields takes any key without a word: what does not come back out was not
+    // understood.
     match missing(table, &config.to_table()?, "") {
         Some(key) => Err(ConfigError::Refused(format!(
             "{origin}: unknown key {key}: remove it"
@@ -373,7 +380,8 @@ impl PartialEq for ExperimentConfig {
 }
 
 impl Default for ExperimentConfig {
-    /// What an empty file describes: the first model of the registry with the defaults of every key.
+    /// What an empty file describes: the first model of the registry with the defaults of every
+    /// key.
     ///
     /// # Panics
     /// Where the registry is empty.

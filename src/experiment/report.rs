@@ -1,4 +1,5 @@
-//! What `keydance reproduce` writes beside the rows: tables, a figure of the first metric, and a manifest of everything.
+//! What `keydance reproduce` writes beside the rows: tables, a figure of the first metric, and a
+//! manifest of everything.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

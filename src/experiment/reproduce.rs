@@ -1,4 +1,5 @@
-//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them all.
+//! The rows of a table, each trained and evaluated, with tables, a figure and a manifest of them
+//! all.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -45,7 +46,8 @@ pub trait Observer: Sync {
         resumed: &Resumed,
     ) -> io::Result<StepObserver>;
 
-    /// Evaluates a model on the test clips as `protocol` says: whoever shows how far that is wraps the model.
+    /// Evaluates a model on the test clips as `protocol` says: whoever shows how far that is wraps
+    /// the model.
     fn evaluate(
         &self,
         protocol: &dyn Protocol,

@@ -45,7 +45,7 @@ impl RowResults {
         let differences = self.folder.config()?.differences(&row.config)?;
         if !differences.is_empty() {
             return Err(ReproduceError::Refused(format!(
-                "{} holds results of another config ({}); values there, values now; {REMEDY}",
+                "{} holds results of another config ({}; values there, values now); {REMEDY}",
                 path.display(),
                 differences.join("; ")
             )));

@@ -31,8 +31,8 @@ pub struct Seeds {
 /// The file of a folder of configs that holds what the paper prints.
 const PRINTED: &str = "paper.toml";
 
-/// All rows of a folder of configs, and what the paper prints: first every model once, in the paper's order and then by name,
-/// then further seeds.
+/// All rows of a folder of configs, and what the paper prints: first every model once, in the
+/// paper's order and then by name, then further seeds.
 ///
 /// Where `only` names some rows, `sets` reach the others as far as they know the key.
 ///

@@ -1,4 +1,5 @@
-//! What may be asked of a model, trained or not: a [`Request`] says what is given, a [`Generator`] makes a [`Motion`] of it.
+//! What may be asked of a model, trained or not: a [`Request`] says what is given, a [`Generator`]
+//! makes a [`Motion`] of it.
 
 use ndarray::{Array1, Array2, Array3};
 use thiserror::Error;
@@ -13,12 +14,13 @@ pub struct Given {
     pub frame: i64,
     /// Local translations (cm) and rotations, one for each joint of the skeleton.
     pub pose: Pose,
-    /// What [`crate::motion::features`] measures at this frame of a recording, `[154]` (cm, rad, cm/frame): where the pose
-    /// was recorded, its facing direction and velocities are known, too.
+    /// What [`crate::motion::features`] measures at this frame of a recording, `[154]` (cm, rad,
+    /// cm/frame): where the pose was recorded, its facing direction and velocities are known, too.
     pub features: Option<Array1<f64>>,
 }
 
-/// What is given for a dance of F frames, and nothing else: the truth never travels with the question.
+/// What is given for a dance of F frames, and nothing else: the truth never travels with the
+/// question.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     pub skeleton: Skeleton,
@@ -30,7 +32,8 @@ pub struct Request {
     pub given: Vec<Given>,
     /// Root positions wanted, `[F, 3]`, cm.
     pub root: Option<Array2<f64>>,
-    /// Velocity factors wanted of trunk, left leg, right leg, right arm and left arm, `[F, 5]`, cm/frame.
+    /// Velocity factors wanted of trunk, left leg, right leg, right arm and left arm, `[F, 5]`,
+    /// cm/frame.
     pub velocity_factors: Option<Array2<f64>>,
     /// Ground contacts wanted, 0 to 1, `[F, feet]`.
     pub contacts: Option<Array2<f64>>,
@@ -45,13 +48,15 @@ pub struct Request {
 pub struct Motion {
     /// World positions of the joints, `[F, joints, 3]`, cm.
     pub positions: Array3<f64>,
-    /// The poses of a model that makes rotations, `[F]`; of others they are fitted to the positions.
+    /// The poses of a model that makes rotations, `[F]`; of others they are fitted to the
+    /// positions.
     pub poses: Option<Vec<Pose>>,
     /// Facing angle, `[F]`, rad, unwrapped.
     pub facing: Option<Array1<f64>>,
     /// Ground contacts, 0 to 1, `[F, feet]`.
     pub contacts: Option<Array2<f64>>,
-    /// What the network said before it became motion, in the numbers of the model, a row a frame that was not given.
+    /// What the network said before it became motion, in the numbers of the model, a row a frame
+    /// that was not given.
     pub raw: Option<Array2<f64>>,
 }
 
@@ -62,7 +67,8 @@ pub enum NeededPoses {
     None,
     /// This many frames before frame 0.
     Past(usize),
-    /// Frame 0 and the last frame, and no other but of the past. What lies between more keyframes is made piece by piece.
+    /// Frame 0 and the last frame, and no other but of the past. What lies between more keyframes
+    /// is made piece by piece.
     Ends,
     /// Two or more, the first at frame 0 and the last at the last frame.
     Keyframes,
@@ -77,7 +83,8 @@ pub enum Condition {
     Music,
 }
 
-/// What a model needs of a request, and what else it heeds: help, errors and warnings follow from it.
+/// What a model needs of a request, and what else it heeds: help, errors and warnings follow from
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Needs {
     pub poses: NeededPoses,
@@ -94,8 +101,8 @@ pub trait Generator: Send + Sync {
 
     fn needs(&self) -> Needs;
 
-    /// A motion for every request, in their order. Each depends on its own request alone; those of one call may differ in
-    /// length.
+    /// A motion for every request, in their order. Each depends on its own request alone; those of
+    /// one call may differ in length.
     ///
     /// # Errors
     /// A request that does not fit together or to the model.
@@ -106,14 +113,14 @@ pub trait Generator: Send + Sync {
     /// # Errors
     /// As [`Generator::generate`]; a model that has none.
     fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
-        let motions = self.generate(requests)?;
+        let motions = self.generate(requests)?.into_iter();
         motions
-            .into_iter()
             .map(|motion| motion.raw.ok_or_else(|| self.lacks("raw output")))
             .collect()
     }
 
-    /// Natural logarithm of the density of each truth under its request, in the numbers of the model.
+    /// Natural logarithm of the density of each truth under its request, in the numbers of the
+    /// model.
     ///
     /// # Errors
     /// As [`Generator::generate`]; a model that has none.
@@ -167,30 +174,29 @@ impl Request {
     /// Refuses a request that lacks what a model needs, or whose parts have other lengths than F.
     ///
     /// # Errors
-    /// [`ModelError::Missing`] that names what to give, [`ModelError::Shape`], [`ModelError::NotFinite`].
+    /// [`ModelError::Missing`] that names what to give, [`ModelError::Shape`],
+    /// [`ModelError::NotFinite`].
     pub fn check(&self, model: &str, needs: &Needs) -> Result<(), ModelError> {
-        let missing = |what: String| ModelError::Missing {
-            model: model.into(),
-            what,
-        };
+        let model = model.to_string();
+        let missing = |what| Err(ModelError::Missing { model, what });
         let at = |frame: i64| self.given.iter().any(|given| given.frame == frame);
         let last = self.frames as i64 - 1;
         let ends = at(0) && at(last);
         let own = self.given.iter().filter(|given| given.frame >= 0).count();
         match needs.poses {
             NeededPoses::Past(frames) if (1..=frames as i64).any(|before| !at(-before)) => {
-                return Err(missing(format!("the {frames} poses before frame 0")));
+                return missing(format!("the {frames} poses before frame 0"));
             }
             NeededPoses::Ends if !(ends && self.frames > 1 && own == 2) => {
-                return Err(missing(format!("two poses, at frame 0 and frame {last}")));
+                return missing(format!("two poses, at frame 0 and frame {last}"));
             }
             NeededPoses::Keyframes if !ends => {
-                return Err(missing(format!("poses at frame 0 and frame {last}")));
+                return missing(format!("poses at frame 0 and frame {last}"));
             }
             _ => {}
         }
         if let Some(condition) = needs.conditions.iter().find(|&&it| !self.has(it)) {
-            return Err(missing(format!("the {}", condition.title())));
+            return missing(format!("the {}", condition.title()));
         }
         for (what, array) in [
             ("root trajectory", &self.root),
@@ -198,51 +204,52 @@ impl Request {
             ("contacts", &self.contacts),
         ] {
             let Some(array) = array else { continue };
-            if array.nrows() != self.frames {
-                return Err(ModelError::Shape {
-                    what: what.into(),
-                    expected: vec![self.frames, array.ncols()],
-                    found: array.shape().to_vec(),
-                });
-            }
-            if !array.iter().all(|x| x.is_finite()) {
-                return Err(ModelError::NotFinite { what: what.into() });
-            }
+            let expected = [self.frames, array.ncols()];
+            check_shape(what, &expected, array.shape())?;
+            check_finite(what, array)?;
         }
         Ok(())
     }
 }
 
+fn check_shape(what: &str, expected: &[usize], found: &[usize]) -> Result<(), ModelError> {
+    match expected == found {
+        true => Ok(()),
+        false => Err(ModelError::Shape {
+            what: what.into(),
+            expected: expected.to_vec(),
+            found: found.to_vec(),
+        }),
+    }
+}
+
+fn check_finite<'x>(
+    what: &str,
+    numbers: impl IntoIterator<Item = &'x f64>,
+) -> Result<(), ModelError> {
+    match numbers.into_iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(ModelError::NotFinite { what: what.into() }),
+    }
+}
+
 impl Motion {
-    /// Refuses a motion that is no answer to a request: other numbers of frames or joints, numbers that are not finite.
+    /// Refuses a motion that is no answer to a request: other numbers of frames or joints, numbers
+    /// that are not finite.
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`].
     pub fn check(&self, request: &Request) -> Result<(), ModelError> {
-        let shape = |what: &str, expected: &[usize], found: &[usize]| match expected == found {
-            true => Ok(()),
-            false => Err(ModelError::Shape {
-                what: what.into(),
-                expected: expected.to_vec(),
-                found: found.to_vec(),
-            }),
-        };
-        let frames = request.frames;
-        let joints = request.skeleton.joints.len();
+        let (frames, joints) = (request.frames, request.skeleton.joints.len());
         let positions = self.positions.shape();
-        shape("predicted positions", &[frames, joints, 3], positions)?;
+        check_shape("predicted positions", &[frames, joints, 3], positions)?;
         if let Some(poses) = &self.poses {
-            shape("predicted poses", &[frames], &[poses.len()])?;
+            check_shape("predicted poses", &[frames], &[poses.len()])?;
         }
         if let Some(facing) = &self.facing {
-            shape("predicted facing angles", &[frames], facing.shape())?;
+            check_shape("predicted facing angles", &[frames], facing.shape())?;
         }
-        if !self.positions.iter().all(|x| x.is_finite()) {
-            return Err(ModelError::NotFinite {
-                what: "predicted frames".into(),
-            });
-        }
-        Ok(())
+        check_finite("predicted frames", &self.positions)
     }
 }
 

@@ -11,21 +11,11 @@ use crate::autograd::check::{CheckReport, ParameterReport};
 const TOLERANCE: f64 = 1e-5;
 /// Largest share of numbers that may stand at a kink.
 const MOST_KINKS: f64 = 0.02;
-/// A check of each case that the model has; its `Display` is a table for each and a line on them all.
+/// A check of each case that the model has; its `Display` is a table for each and a line on them
+/// all.
 pub struct GradientReport {
     /// Title and report.
     cases: Vec<(String, CheckReport)>,
-}
-
-/// Why a gradient does not pass.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GradientFault {
-    #[error("a gradient is wrong: its error {error:.1e} is above {TOLERANCE:.0e}")]
-    Wrong { error: f64 },
-    #[error(
-        "too little was compared: {kinks} of {drawn} numbers stand at a kink; another --seed may draw better ones"
-    )]
-    TooLittle { kinks: usize, drawn: usize },
 }
 
 impl GradientReport {
@@ -45,17 +35,20 @@ impl GradientReport {
     ///
     /// # Errors
     /// An error is too large, or too few numbers could be compared.
-    pub fn verdict(&self) -> Result<(), GradientFault> {
-        let error = self.error();
-        if error > TOLERANCE {
-            return Err(GradientFault::Wrong { error });
-        }
-        let kinks = self.kinks();
+    pub fn verdict(&self) -> Result<(), ModelError> {
+        let (error, kinks) = (self.error(), self.kinks());
         let drawn = self.compared() + kinks;
-        if drawn == 0 || kinks as f64 > MOST_KINKS * drawn as f64 {
-            return Err(GradientFault::TooLittle { kinks, drawn });
-        }
-        Ok(())
+        let reason = if error > TOLERANCE {
+            format!("a gradient is wrong: its error {error:.1e} is above {TOLERANCE:.0e}")
+        } else if drawn == 0 || kinks as f64 > MOST_KINKS * drawn as f64 {
+            format!(
+                "too little was compared: {kinks} of {drawn} numbers stand at a kink; another \
+                 --seed may draw better ones"
+            )
+        } else {
+            return Ok(());
+        };
+        Err(ModelError::Data { reason })
     }
 
     fn error(&self) -> f64 {
@@ -75,8 +68,7 @@ impl GradientReport {
 impl fmt::Display for GradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (title, report) in &self.cases {
-            writeln!(f, "{title}")?;
-            writeln!(f, "{}", table(report))?;
+            writeln!(f, "{title}\n{}", table(report))?;
         }
         writeln!(
             f,
@@ -105,20 +97,17 @@ fn table(report: &CheckReport) -> String {
     for (group, members) in groups {
         let compared: usize = members.iter().map(|p| p.compared).sum();
         let kinks: usize = members.iter().map(|p| p.kinks).sum();
-        let worst = members
-            .iter()
-            .filter_map(|p| p.worst.as_ref().map(|worst| (p, worst)))
-            .max_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
-        let (error, place) = match worst {
-            Some((parameter, worst)) => (
-                format!("{:.1e}", worst.error),
-                format!(
-                    "{}[{}]: gradient {:.8e}, difference {:.8e}",
-                    parameter.parameter, worst.index, worst.analytic, worst.numeric
-                ),
-            ),
-            None => ("-".into(), "-".into()),
-        };
+        let worst = members.iter().filter_map(|p| Some((p, p.worst.as_ref()?)));
+        let worst = worst.max_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
+        let mut shown = ("-".to_string(), "-".to_string());
+        if let Some((ParameterReport { parameter, .. }, worst)) = worst {
+            shown.0 = format!("{:.1e}", worst.error);
+            shown.1 = format!(
+                "{parameter}[{}]: gradient {:.8e}, difference {:.8e}",
+                worst.index, worst.analytic, worst.numeric
+            );
+        }
+        let (error, place) = shown;
         text += &format!("  {group:<28} {compared:>8} {kinks:>6} {error:>9}  {place}\n");
     }
     text

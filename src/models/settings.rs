@@ -1,4 +1,5 @@
-//! What the commands ask of a kind of model: to read its part of a config, and to build what that describes.
+//! What the commands ask of a kind of model: to read its part of a config, and to build what that
+//! describes.
 
 use std::any::Any;
 use std::fmt;
@@ -42,7 +43,8 @@ pub trait ModelKind: Send + Sync {
     /// The paper whose tables and figures its models stand in.
     fn paper(&self) -> Paper;
 
-    /// The tables of a config that are its own, `[model]` among them, with the default of every key.
+    /// The tables of a config that are its own, `[model]` among them, with the default of every
+    /// key.
     fn defaults(&self) -> Table;
 
     /// Reads these tables.
@@ -89,7 +91,8 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// The steps of its training, its weights added through `init`.
     ///
     /// # Errors
-    /// A model that is not trained, data that it cannot be trained on, more weights than `init` allows.
+    /// A model that is not trained, data that it cannot be trained on, more weights than `init`
+    /// allows.
     fn task<'d>(
         &self,
         setting: &TaskSetting<'d>,
@@ -120,8 +123,8 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// How its tables score a model.
     fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol>;
 
-    /// Compares the gradient of its loss with central differences, in f64 and, unless `full_size`, in small sizes. A title and
-    /// a report for each way to compute the loss.
+    /// Compares the gradient of its loss with central differences, in f64 and, unless `full_size`,
+    /// in small sizes. A title and a report for each way to compute the loss.
     ///
     /// # Errors
     /// A model that is not trained, or nothing to check it on.

@@ -2,8 +2,8 @@
 
 use ndarray::ArrayD;
 
-/// Named arrays that a model needs beside its weights and that training does not move, such as means and deviations of its
-/// data: in f64 while they are in use, in f32 in the weights file.
+/// Named arrays that a model needs beside its weights and that training does not move, such as
+/// means and deviations of its data: in f64 while they are in use, in f32 in the weights file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Statistics {
     arrays: Vec<(&'static str, ArrayD<f64>)>,

@@ -1,7 +1,8 @@
 //! Named random streams from one seed.
 //!
-//! A stream is found again from the seed, its name and its indices alone. So nothing of a generator's state has to be saved: a
-//! training that resumes at step s draws what it would have drawn there anyway.
+//! A stream is found again from the seed, its name and its indices alone. So nothing of a
+//! generator's state has to be saved: a training that resumes at step s draws what it would have
+//! drawn there anyway.
 
 use rand::Rng;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -33,7 +34,8 @@ impl Streams {
         self.stream("dropout", &[step, shard as u64]).next_u64()
     }
 
-    /// The stream of this name and these indices, such as the shuffling of an epoch: each model names its own.
+    /// The stream of this name and these indices, such as the shuffling of an epoch: each model
+    /// names its own.
     pub fn stream(&self, name: &str, indices: &[u64]) -> ChaCha8Rng {
         let mut hash = Sha256::new();
         hash.update(self.seed.to_le_bytes());

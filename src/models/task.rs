@@ -16,22 +16,24 @@ pub trait Task<T: Real>: Send + Sync {
     /// Frames that all its steps train together.
     fn frame_steps(&self) -> u64;
 
-    /// What step `step` (from 0) trains. It follows from the seed and `step` alone, which is what makes a resumed training
-    /// end at the same bits.
+    /// What step `step` (from 0) trains. It follows from the seed and `step` alone, which is what
+    /// makes a resumed training end at the same bits.
     fn step(&self, step: u64) -> Box<dyn Step<T> + '_>;
 
-    /// Where a step stands in the task's own schedule, such as epoch and batch: a checkpoint keeps it, and is refused where
-    /// its step now stands elsewhere.
+    /// Where a step stands in the task's own schedule, such as epoch and batch: a checkpoint keeps
+    /// it, and is refused where its step now stands elsewhere.
     fn place(&self, step: u64) -> [u64; 2] {
         [0, step]
     }
 
-    /// The group of learning rates that a parameter belongs to, see [`crate::optim::AdamConfig::rates`].
+    /// The group of learning rates that a parameter belongs to, see
+    /// [`crate::optim::AdamConfig::rates`].
     fn rate_group(&self, _parameter: &str) -> Option<&str> {
         None
     }
 
-    /// Numbers that are saved beside the weights and that the trained model needs, such as means and deviations of its data.
+    /// Numbers that are saved beside the weights and that the trained model needs, such as means
+    /// and deviations of its data.
     fn statistics(&self) -> Statistics;
 
     /// The model with these weights, which are those that the task was built with.
@@ -55,13 +57,15 @@ pub trait Task<T: Real>: Send + Sync {
 
 /// One step of a training.
 pub trait Step<T: Real>: Send + Sync {
-    /// Parts that are computed by themselves, on as many threads as there are; the step's gradient is their sum.
+    /// Parts that are computed by themselves, on as many threads as there are; the step's gradient
+    /// is their sum.
     fn shards(&self) -> usize;
 
     /// Frames that the step trains.
     fn frames(&self) -> u64;
 
-    /// The losses of one of its [shards](Step::shards), scaled so that those of all shards add up to the step's.
+    /// The losses of one of its [shards](Step::shards), scaled so that those of all shards add up
+    /// to the step's.
     ///
     /// # Errors
     /// Operands that an operation refuses.
@@ -81,14 +85,14 @@ pub trait Step<T: Real>: Send + Sync {
 pub struct LossTerms {
     /// The weighted sum that is run backwards.
     pub total: Var,
-    /// The part of `total` that the weights named [`CRITICS`].. minimise, in an adversarial training. Their gradients come
-    /// from it alone, and the gradients of all other weights from the rest of `total` alone: each side is a constant in the
-    /// other's part.
+    /// The part of `total` that the weights named [`CRITICS`].. minimise, in an adversarial
+    /// training. Their gradients come from it alone, and the gradients of all other weights from
+    /// the rest of `total` alone: each side is a constant in the other's part.
     pub critics: Option<Var>,
     /// Terms by name, not weighted, in a fixed order.
     pub terms: Vec<(&'static str, Var)>,
-    /// New values of buffers, such as running means, each with as many numbers as the buffer. They are taken up after the
-    /// step: where several shards give one buffer's, their mean.
+    /// New values of buffers, such as running means, each with as many numbers as the buffer. They
+    /// are taken up after the step: where several shards give one buffer's, their mean.
     pub buffers: Vec<(BufferId, Vec<f64>)>,
 }
 

@@ -1,9 +1,11 @@
-//! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32, the statistics that the
-//! model needs beside them, and the config.
+//! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32,
+//! the statistics that the model needs beside them, and the config.
 //!
-//! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program that wrote the file).
+//! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program
+//! that wrote the file).
 
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
 use ndarray::{ArrayD, IxDyn};
@@ -16,6 +18,7 @@ use super::Statistics;
 use crate::autograd::Parameters;
 use crate::data::hexadecimal;
 use crate::nn::MOST_WEIGHTS;
+use crate::run::FileError;
 
 const METADATA: &str = "keydance";
 /// Bytes that a weights file may have beside its weights: config, names, shapes, statistics.
@@ -24,43 +27,11 @@ const LARGEST_HEADER: u64 = 1 << 24;
 /// Why a file does not give the weights of a model.
 #[derive(Debug, Error)]
 pub enum WeightsError {
-    #[error("{path} cannot be read: {cause}")]
-    File {
-        path: PathBuf,
-        cause: std::io::Error,
-    },
-    #[error("{path} has {found} bytes, weights of this model have at most {most}")]
-    TooLarge {
-        path: PathBuf,
-        found: u64,
-        most: u64,
-    },
-    #[error("{path} is not a whole safetensors file: {cause}")]
-    Format {
-        path: PathBuf,
-        cause: safetensors::SafeTensorError,
-    },
-    #[error("{path} was not written by keydance: {problem}")]
-    Foreign { path: PathBuf, problem: String },
-    #[error("{path} has no {name} {expected:?}, which the model of its config has")]
-    Missing {
-        path: PathBuf,
-        name: String,
-        expected: Vec<usize>,
-    },
-    #[error("{path} has {name} {found:?}, which the model of its config has not")]
-    Unknown {
-        path: PathBuf,
-        name: String,
-        found: Vec<usize>,
-    },
-    #[error("{path}: {name} is {found} in the file, {expected} in the model of its config")]
-    Shape {
-        path: PathBuf,
-        name: String,
-        found: String,
-        expected: String,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It is damaged, or of something else: what does not fit.
+    #[error("{0}")]
+    Refused(String),
     #[error("{path}: {name} {problem}")]
     Value {
         path: PathBuf,
@@ -99,14 +70,11 @@ pub fn to_safetensors(
     config: &str,
 ) -> Result<Vec<u8>, WeightsError> {
     let single = |array: &ArrayD<f64>| bytes(array.iter().map(|&x| x as f32));
+    let statistics = statistics.iter();
     let tensors: Vec<(&str, Vec<usize>, Vec<u8>)> = parameters
         .saved()
         .map(|(name, value)| (name, value.shape().to_vec(), bytes(value.iter().copied())))
-        .chain(
-            statistics
-                .iter()
-                .map(|(name, array)| (name, array.shape().to_vec(), single(array))),
-        )
+        .chain(statistics.map(|(name, array)| (name, array.shape().to_vec(), single(array))))
         .collect();
     let views = tensors
         .iter()
@@ -138,20 +106,16 @@ pub fn digest(parameters: &Parameters<f32>) -> String {
 
 /// The content of a file of at most `weights` weights.
 pub(crate) fn read_file(path: &Path, weights: usize) -> Result<Vec<u8>, WeightsError> {
-    let unreadable = |cause| WeightsError::File {
-        path: path.into(),
-        cause,
-    };
-    let found = std::fs::metadata(path).map_err(unreadable)?.len();
+    let file = std::fs::metadata(path).map_err(FileError::at(path, "read"))?;
     let most = 4 * weights as u64 + LARGEST_HEADER;
-    if found > most {
-        return Err(WeightsError::TooLarge {
-            path: path.into(),
-            found,
-            most,
-        });
+    if file.len() > most {
+        return Err(WeightsError::Refused(format!(
+            "{} has {} bytes, weights of this model have at most {most}",
+            path.display(),
+            file.len()
+        )));
     }
-    std::fs::read(path).map_err(unreadable)
+    Ok(std::fs::read(path).map_err(FileError::at(path, "read"))?)
 }
 
 impl SavedWeights {
@@ -168,32 +132,28 @@ impl SavedWeights {
     /// # Errors
     /// As [`SavedWeights::read`].
     pub fn parse(content: &[u8], path: &Path) -> Result<Self, WeightsError> {
-        let damaged = |cause| WeightsError::Format {
-            path: path.into(),
-            cause,
-        };
-        let foreign = |problem| WeightsError::Foreign {
-            path: path.into(),
-            problem,
+        let bad = |problem: String| WeightsError::Refused(format!("{} {problem}", path.display()));
+        let damaged = |cause| bad(format!("is not a whole safetensors file: {cause}"));
+        let foreign = |problem: &str| {
+            bad(format!(
+                "was not written by keydance: its metadata{problem}"
+            ))
         };
         let (_, header) = SafeTensors::read_metadata(content).map_err(damaged)?;
-        let metadata = header
-            .metadata()
-            .as_ref()
+        let entries = header.metadata().as_ref();
+        let metadata = entries
             .and_then(|entries| entries.get(METADATA))
-            .ok_or_else(|| foreign(format!("its metadata has no entry {METADATA:?}")))?;
+            .ok_or_else(|| foreign(&format!(" has no entry {METADATA:?}")))?;
         let Metadata { config, version } = serde_json::from_str(metadata)
-            .map_err(|error| foreign(format!("its metadata entry {METADATA:?}: {error}")))?;
+            .map_err(|error| foreign(&format!(" entry {METADATA:?}: {error}")))?;
         let tensors = SafeTensors::deserialize(content).map_err(damaged)?;
-        let mut arrays = BTreeMap::new();
-        for (name, view) in tensors.iter() {
-            arrays.insert(name.to_string(), array(path, name, &view)?);
-        }
+        let tensors = tensors.iter();
+        let arrays = tensors.map(|(name, view)| Ok((name.into(), array(path, name, &view)?)));
         Ok(Self {
             path: path.into(),
             config,
             version,
-            arrays,
+            arrays: arrays.collect::<Result<_, WeightsError>>()?,
         })
     }
 
@@ -207,24 +167,28 @@ impl SavedWeights {
     }
 
     fn array(&self, name: &str, expected: &[usize]) -> Result<&ArrayD<f32>, WeightsError> {
-        let missing = || WeightsError::Missing {
-            path: self.path.clone(),
-            name: name.into(),
-            expected: expected.to_vec(),
-        };
-        let array = self.arrays.get(name).ok_or_else(missing)?;
-        check_shape(&self.path, name, array.shape(), expected)?;
-        Ok(array)
+        let path = self.path.display();
+        let array = self.arrays.get(name).ok_or_else(|| {
+            WeightsError::Refused(format!(
+                "{path} has no {name} {expected:?}, which the model of its config has"
+            ))
+        })?;
+        match array.shape() {
+            shape if shape == expected => Ok(array),
+            shape => Err(misfit(&self.path, name, shape, expected)),
+        }
     }
 
-    /// Most weights that a model may have to be built for these: not many more than there are, as the sizes in a file cannot be
-    /// trusted; but some, so that a parameter which the file lacks is named.
+    /// Most weights that a model may have to be built for these: not many more than there are, as
+    /// the sizes in a file cannot be trusted; but some, so that a parameter which the file lacks is
+    /// named.
     pub fn most_weights(&self) -> usize {
         let weights: usize = self.arrays.values().map(ArrayD::len).sum();
         2 * weights + (1 << 20)
     }
 
-    /// Puts the values into a model's parameters and buffers. `statistics` are what else the file may hold.
+    /// Puts the values into a model's parameters and buffers. `statistics` are what else the file
+    /// may hold.
     ///
     /// # Errors
     /// The file and the model do not have the same names and shapes; then nothing is changed.
@@ -241,11 +205,11 @@ impl SavedWeights {
                 || statistics.iter().any(|(known, _)| known == name)
         };
         if let Some((name, value)) = self.arrays.iter().find(|(name, _)| !known(name)) {
-            return Err(WeightsError::Unknown {
-                path: self.path.clone(),
-                name: name.clone(),
-                found: value.shape().to_vec(),
-            });
+            return Err(WeightsError::Refused(format!(
+                "{} has {name} {:?}, which the model of its config has not",
+                self.path.display(),
+                value.shape()
+            )));
         }
         for (name, value) in parameters.saved_mut() {
             if let Some(saved) = self.arrays.get(name) {
@@ -257,38 +221,20 @@ impl SavedWeights {
 }
 
 fn array(path: &Path, name: &str, view: &TensorView) -> Result<ArrayD<f32>, WeightsError> {
-    let misfit = |found: String| WeightsError::Shape {
-        path: path.into(),
-        name: name.into(),
-        found,
-        expected: "F32".into(),
-    };
+    let bad = |found: String| misfit(path, name, format_args!("{found}"), format_args!("F32"));
     if view.dtype() != Dtype::F32 {
-        return Err(misfit(view.dtype().to_string()));
+        return Err(bad(view.dtype().to_string()));
     }
     let (chunks, _) = view.data().as_chunks::<4>();
-    let values = chunks
-        .iter()
-        .map(|bytes| f32::from_le_bytes(*bytes))
-        .collect();
-    ArrayD::from_shape_vec(IxDyn(view.shape()), values)
-        .map_err(|error| misfit(format!("{:?} ({error})", view.shape())))
+    let values = chunks.iter().map(|bytes| f32::from_le_bytes(*bytes));
+    ArrayD::from_shape_vec(IxDyn(view.shape()), values.collect())
+        .map_err(|error| bad(format!("{:?} ({error})", view.shape())))
 }
 
-fn check_shape(
-    path: &Path,
-    name: &str,
-    found: &[usize],
-    expected: &[usize],
-) -> Result<(), WeightsError> {
-    if found == expected {
-        Ok(())
-    } else {
-        Err(WeightsError::Shape {
-            path: path.into(),
-            name: name.into(),
-            found: format!("{found:?}"),
-            expected: format!("{expected:?}"),
-        })
-    }
+/// The error of an array that is another than the model's.
+fn misfit(path: &Path, name: &str, found: impl Debug, expected: impl Debug) -> WeightsError {
+    WeightsError::Refused(format!(
+        "{}: {name} is {found:?} in the file, {expected:?} in the model of its config",
+        path.display()
+    ))
 }

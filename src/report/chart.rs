@@ -17,7 +17,8 @@ const BOTTOM: f64 = 416.0;
 const INK: &str = "#222222";
 const FAINT: &str = "#e3e3e3";
 
-/// Colours of the lines in their order, most of them Okabe and Ito's, which stay apart for colour-blind readers.
+/// Colours of the lines in their order, most of them Okabe and Ito's, which stay apart for
+/// colour-blind readers.
 const COLOURS: [&str; 12] = [
     "#222222", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6a00",
     "#882255", "#6f6f6f", "#332288", "#8fbc3a",
@@ -178,7 +179,8 @@ fn draw_line(svg: &mut Svg, line: &Line, places: &[[f64; 2]], index: usize) {
     svg.end_group();
 }
 
-/// The span of one axis, in its scale's own measure (logarithms on a logarithmic one), and where it lies in the figure.
+/// The span of one axis, in its scale's own measure (logarithms on a logarithmic one), and where it
+/// lies in the figure.
 struct Range {
     scale: Scale,
     low: f64,

@@ -53,8 +53,8 @@ impl Drawn {
         }
     }
 
-    /// Draws the bones from the farthest to the nearest, each outlined, then the head where it belongs among them. `marked` parts
-    /// have their own colour.
+    /// Draws the bones from the farthest to the nearest, each outlined, then the head where it
+    /// belongs among them. `marked` parts have their own colour.
     pub fn draw(&self, svg: &mut Svg, origin: [f64; 2], palette: Palette, marked: [bool; PARTS]) {
         let at = |joint: usize| {
             let [x, y] = self.joints[joint].0;
@@ -99,7 +99,8 @@ const HEAD_JOINT: usize = 23;
 /// Radius of the head, pixels.
 const HEAD: f64 = 8.0;
 
-/// Width of the bone that ends at this joint, pixels: the spine is thicker than the limbs, the ends of limbs thinner.
+/// Width of the bone that ends at this joint, pixels: the spine is thicker than the limbs, the ends
+/// of limbs thinner.
 fn bone_width(joint: usize) -> f64 {
     match joint {
         9..=13 => 7.6,

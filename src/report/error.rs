@@ -18,24 +18,19 @@ pub enum FigureError {
     Empty { figure: String, what: &'static str },
     #[error("the figure {figure:?}: {series} has a NaN or an infinity")]
     NotFinite { figure: String, series: String },
-    #[error(
-        "the figure {figure:?}: {row} has {found} frames, the first row has {expected}; rows show \
-         the same frames"
-    )]
-    Frames {
-        figure: String,
-        row: String,
-        found: usize,
-        expected: usize,
-    },
-    #[error(
-        "{figure:?}: keyframe {frame} lies outside its {frames} frames, which are numbered from 0"
-    )]
-    Keyframe {
-        figure: String,
-        frame: usize,
-        frames: usize,
-    },
+    /// Parts of a figure that do not go together: which, and why.
+    #[error("{0}")]
+    Unfit(String),
+}
+
+impl FigureError {
+    /// A row that has other frames than the first.
+    pub(super) fn frames(figure: &str, row: &str, found: usize, expected: usize) -> Self {
+        Self::Unfit(format!(
+            "the figure {figure:?}: {row} has {found} frames, the first row has {expected}; rows \
+             show the same frames"
+        ))
+    }
 }
 
 /// Why a demo or a paper's figures cannot be made.

@@ -40,11 +40,12 @@ pub enum Shown {
     Count(usize),
 }
 
-/// Where dancers stand. Frames stand in equal distances, so the horizontal travel of a root is taken out.
+/// Where dancers stand. Frames stand in equal distances, so the horizontal travel of a root is
+/// taken out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Placing {
-    /// That of the first row's root is taken out of every row: a row whose root leaves the first row's path stands off its place. All rows have the
-    /// same number of frames.
+    /// That of the first row's root is taken out of every row: a row whose root leaves the first
+    /// row's path stands off its place. All rows have the same number of frames.
     OnFirstPath,
     /// Each row's own.
     OnOwnPath,
@@ -139,7 +140,8 @@ impl MotionFigure {
     ///
     /// # Errors
     ///
-    /// [`FigureError`]: no rows or frames, rows of different length on the first one's path, a NaN or infinity.
+    /// [`FigureError`]: no rows or frames, rows of different length on the first one's path, a NaN
+    /// or infinity.
     pub fn svg(&self) -> Result<String, FigureError> {
         self.check()?;
         let rows = self.placed();
@@ -212,12 +214,13 @@ impl MotionFigure {
                 return Err(empty("no frames"));
             }
             if self.placing == Placing::OnFirstPath && row.frames.len() != first.frames.len() {
-                return Err(FigureError::Frames {
-                    figure: self.title.clone(),
-                    row: row.label.clone(),
-                    found: row.frames.len(),
-                    expected: first.frames.len(),
-                });
+                let (found, expected) = (row.frames.len(), first.frames.len());
+                return Err(FigureError::frames(
+                    &self.title,
+                    &row.label,
+                    found,
+                    expected,
+                ));
             }
             let mut joints = row.frames.iter().flatten();
             if !(joints.all(|joint| joint.is_finite())

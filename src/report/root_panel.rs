@@ -1,4 +1,5 @@
-//! A row's root trajectories in a small panel: asked for in blue, generated in red, as in the paper's figures.
+//! A row's root trajectories in a small panel: asked for in blue, generated in red, as in the
+//! paper's figures.
 
 use glam::DVec3;
 
@@ -33,7 +34,8 @@ pub struct RootPaths {
 }
 
 impl RootPaths {
-    /// Points of a path as the panel shows them: right and down, cm; time counts as 1 cm a frame until it is scaled.
+    /// Points of a path as the panel shows them: right and down, cm; time counts as 1 cm a frame
+    /// until it is scaled.
     fn flat(&self, path: &[DVec3]) -> Vec<[f64; 2]> {
         let flat = |(frame, place): (usize, &DVec3)| match self.view {
             PathView::Above => [place.x, place.z],

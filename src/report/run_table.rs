@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::thousands;
 use crate::evaluation::EvaluationRecord;
 use crate::experiment::ExperimentConfig;
-use crate::run::{RunError, RunFolder, RunProgress, RunStatus};
+use crate::run::{RunError, RunFolder, RunProgress, RunState};
 
 /// Folders inside folders that are looked through for runs.
 const DEEPEST: usize = 4;
@@ -59,7 +59,25 @@ impl RunTable {
 
 impl fmt::Display for RunTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&table(&self.rows))?;
+        let header = HEADER.map(String::from);
+        let lines = || {
+            [&header]
+                .into_iter()
+                .chain(self.rows.iter().map(|row| &row.cells))
+        };
+        let widths: [usize; HEADER.len()] = std::array::from_fn(|column| {
+            let cells = lines().map(|line| line[column].chars().count());
+            cells.max().unwrap_or_default()
+        });
+        for line in lines() {
+            let cells = line.iter().zip(widths).enumerate();
+            let cells = cells.map(|(column, (cell, width))| match TEXT.contains(&column) {
+                true => format!("{cell:<width$}"),
+                false => format!("{cell:>width$}"),
+            });
+            let line = cells.collect::<Vec<_>>().join("  ");
+            writeln!(f, "{}", line.trim_end())?;
+        }
         for row in &self.rows {
             for problem in &row.problems {
                 writeln!(f, "{}: {problem}", row.cells[0])?;
@@ -128,7 +146,7 @@ impl Row {
         }
         let config = run.config()?;
         self.cells[1] = config.name.clone();
-        self.cells[2] = state(&config, progress.as_ref(), run);
+        self.cells[2] = state(&config, progress.as_ref(), run).into();
         Ok(())
     }
 
@@ -164,52 +182,23 @@ fn version(version: &str, commit: Option<&str>) -> String {
     format!("{version} {short}").trim_end().into()
 }
 
-fn state(config: &ExperimentConfig, progress: Option<&RunProgress>, run: &RunFolder) -> String {
+fn state(
+    config: &ExperimentConfig,
+    progress: Option<&RunProgress>,
+    run: &RunFolder,
+) -> &'static str {
     let Some(progress) = progress else {
-        let untrained = config.model.untrained(&config.data);
-        return if untrained.is_some() {
-            "needs no training"
-        } else {
-            "not begun"
-        }
-        .into();
+        return match config.model.untrained(&config.data) {
+            Some(_) => "needs no training",
+            None => "not begun",
+        };
     };
-    match progress.status {
-        RunStatus::Running => "running",
-        RunStatus::Stopped => "stopped",
-        RunStatus::Interrupted => "interrupted",
-        RunStatus::Diverged => "diverged",
-        RunStatus::Finished if run.weights().exists() => "finished",
-        RunStatus::Finished => "finished, no weights",
+    match progress.manifest.state {
+        RunState::Running if progress.is_running => "running",
+        RunState::Running => "interrupted",
+        RunState::Stopped => "stopped",
+        RunState::Diverged => "diverged",
+        RunState::Finished if run.weights().exists() => "finished",
+        RunState::Finished => "finished, no weights",
     }
-    .into()
-}
-
-fn table(rows: &[Row]) -> String {
-    let header = HEADER.map(String::from);
-    let lines: Vec<&[String; HEADER.len()]> = std::iter::once(&header)
-        .chain(rows.iter().map(|row| &row.cells))
-        .collect();
-    let widths: Vec<usize> = (0..HEADER.len())
-        .map(|column| lines.iter().map(|line| line[column].chars().count()).max())
-        .map(Option::unwrap_or_default)
-        .collect();
-    let mut text = String::new();
-    for line in lines {
-        let cells: Vec<String> = line
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(column, (cell, &width))| {
-                if TEXT.contains(&column) {
-                    format!("{cell:<width$}")
-                } else {
-                    format!("{cell:>width$}")
-                }
-            })
-            .collect();
-        text += cells.join("  ").trim_end();
-        text.push('\n');
-    }
-    text
 }

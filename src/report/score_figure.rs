@@ -12,7 +12,8 @@ pub struct ScoreSeries {
     pub name: String,
     /// `(N in frames, score)`, ascending in N: ours.
     pub ours: Vec<(f64, f64)>,
-    /// Likewise what the paper prints of this model, drawn dashed in the same colour; empty where it prints nothing.
+    /// Likewise what the paper prints of this model, drawn dashed in the same colour; empty where
+    /// it prints nothing.
     pub paper: Vec<(f64, f64)>,
 }
 
@@ -58,8 +59,8 @@ pub(super) fn metric_axis(metric: &Metric) -> String {
     format!("{} ({}), {better}", metric.title, metric.unit)
 }
 
-/// The figure of the rows' scores on test clips, SVG: the mean over a model's seeds, and of the rows that the paper's file names
-/// the printed ones.
+/// The figure of the rows' scores on test clips, SVG: the mean over a model's seeds, and of the
+/// rows that the paper's file names the printed ones.
 ///
 /// None where no column is a number that scores could be drawn over.
 ///

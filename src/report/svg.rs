@@ -159,7 +159,8 @@ impl Svg {
         ));
     }
 
-    /// Sets a caption under the figure, which grows for it; lines break at the figure's width. An empty one changes nothing.
+    /// Sets a caption under the figure, which grows for it; lines break at the figure's width. An
+    /// empty one changes nothing.
     pub fn caption(&mut self, caption: &str) {
         const SIZE: f64 = 13.0;
         const LINE: f64 = 18.0;
@@ -206,8 +207,9 @@ impl Svg {
     }
 }
 
-/// Text in lines of at most `most` characters, broken at spaces and, as names of files and runs need it, behind `_` and `-`. What cannot be broken
-/// has a line of its own. A no-break space holds.
+/// Text in lines of at most `most` characters, broken at spaces and, as names of files and runs
+/// need it, behind `_` and `-`. What cannot be broken has a line of its own. A no-break space
+/// holds.
 pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {

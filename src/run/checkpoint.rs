@@ -1,4 +1,5 @@
-//! Checkpoints: folders `step-XXXXXXXX` with `weights.safetensors` and `state.bin`, each there whole or not at all.
+//! Checkpoints: folders `step-XXXXXXXX` with `weights.safetensors` and `state.bin`, each there
+//! whole or not at all.
 
 use std::borrow::Cow;
 use std::fs;

@@ -25,8 +25,8 @@ const MANIFEST: &str = "manifest.json";
 const LOG: &str = "log.jsonl";
 const CHECKPOINTS: &str = "checkpoints";
 
-/// A folder that holds one run. To write to it takes [`RunFolder::create`], [`RunFolder::replace`] or [`RunFolder::resume`], which
-/// keep all others from doing so while the value lives.
+/// A folder that holds one run. To write to it takes [`RunFolder::create`], [`RunFolder::replace`]
+/// or [`RunFolder::resume`], which keep all others from doing so while the value lives.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
@@ -51,7 +51,8 @@ impl RunFolder {
     /// A folder for a new run, in place of an earlier run of the same name.
     ///
     /// # Errors
-    /// The folder holds a run of another name, another training writes to it, or it cannot be written.
+    /// The folder holds a run of another name, another training writes to it, or it cannot be
+    /// written.
     pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         if run.config_path().exists() && run.config()?.name == config.name {
@@ -67,7 +68,8 @@ impl RunFolder {
     /// The folder of a run that goes on; a new run where it has not begun.
     ///
     /// # Errors
-    /// The run there has another config, another training writes to it, or it cannot be read or written.
+    /// The run there has another config, another training writes to it, or it cannot be read or
+    /// written.
     pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
         if !run.config_path().exists() {

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::durable::FileError;
 use super::error::RunError;
 
-/// The file that a training holds locked while it writes to the folder. It stays there: only the lock counts, and that ends with
-/// the process, however it ends.
+/// The file that a training holds locked while it writes to the folder. It stays there: only the
+/// lock counts, and that ends with the process, however it ends.
 const LOCK: &str = ".lock";
 
 /// A folder that nobody else writes to while this lives.
@@ -48,7 +48,8 @@ impl FolderLock {
 }
 
 impl Drop for FolderLock {
-    /// Unlocks, as closing the file does not where a process that another thread has just begun still has it open.
+    /// Unlocks, as closing the file does not where a process that another thread has just begun
+    /// still has it open.
     fn drop(&mut self) {
         if let Some(file) = &self.file {
             // What cannot be unlocked ends with the process.

@@ -10,7 +10,8 @@ use crate::data::{Dataset, Recording};
 use crate::experiment::ExperimentConfig;
 use crate::models::Task;
 
-/// Format of the manifest; raised when an older program would misread a newer one. Manifests from before it was written have 1.
+/// Format of the manifest; raised when an older program would misread a newer one. Manifests from
+/// before it was written have 1.
 pub(crate) const FORMAT: u32 = 1;
 
 /// A version of this program.

@@ -1,7 +1,8 @@
 //! What a training needs beside the weights to go on to the bit: `state.bin`.
 //!
 //! ```text
-//! magic "KDSTATE\0" | format version, u32 | header, bincode | moments of Adam, bincode | SHA-256 of all before
+//! magic "KDSTATE\0" | format version, u32 | header, bincode | moments of Adam, bincode
+//! | SHA-256 of all before
 //! ```
 //!
 //! The random streams need nothing saved, see [`super::Streams`].

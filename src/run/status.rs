@@ -7,25 +7,12 @@ use super::lock::FolderLock;
 use super::log;
 use super::manifest::{Manifest, RunState};
 
-/// How a run stands at this moment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RunStatus {
-    /// A training writes to the folder.
-    Running,
-    /// Stopped on request: goes on from where it stopped.
-    Stopped,
-    /// Ended without a word, killed or by an error: goes on from its newest checkpoint.
-    Interrupted,
-    /// A loss or gradient was not finite.
-    Diverged,
-    Finished,
-}
-
 /// How far a run got.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunProgress {
-    pub status: RunStatus,
-    /// Of an interrupted run: those that are saved.
+    /// Whether a training writes to the folder at this moment.
+    pub is_running: bool,
+    /// Of a run that was interrupted, killed or ended by an error: those that are saved.
     pub steps_done: u64,
     pub frame_steps_done: u64,
     /// Frames predicted in a second of wall-clock time; of a run that runs, in its last step.
@@ -42,32 +29,23 @@ impl RunFolder {
         let Some(manifest) = self.manifest()? else {
             return Ok(None);
         };
-        let status = match manifest.state {
-            RunState::Stopped => RunStatus::Stopped,
-            RunState::Diverged => RunStatus::Diverged,
-            RunState::Finished => RunStatus::Finished,
-            RunState::Running if FolderLock::is_taken(self.path()) => RunStatus::Running,
-            RunState::Running => RunStatus::Interrupted,
-        };
-        let logged = match status {
-            // The manifest is as old as its newest checkpoint.
-            RunStatus::Running => log::last(&self.log_path()),
-            _ => None,
-        };
+        let unended = manifest.state == RunState::Running;
+        let is_running = unended && FolderLock::is_taken(self.path());
         let mean = manifest.frame_steps_done as f64 / manifest.seconds;
         let mut progress = RunProgress {
-            status,
+            is_running,
             steps_done: manifest.steps_done,
             frame_steps_done: manifest.frame_steps_done,
             frame_steps_per_second: (mean > 0.0 && mean.is_finite()).then_some(mean),
             manifest,
         };
-        if let Some(line) = logged {
+        // The manifest is as old as its newest checkpoint.
+        if is_running && let Some(line) = log::last(&self.log_path()) {
             progress.steps_done = line.step;
             progress.frame_steps_done = line.frame_steps;
             progress.frame_steps_per_second = Some(line.frame_steps_per_second);
         }
-        if status == RunStatus::Interrupted {
+        if unended && !is_running {
             let newest = checkpoint::list(&self.checkpoints())?.pop();
             progress.steps_done = newest.map_or(0, |(step, _)| step);
         }

@@ -26,44 +26,37 @@ impl Subject {
     /// # Errors
     /// There is no such run or config, its model is not trained, or its weights are damaged.
     pub fn open(path: &Path, set: &[String]) -> Result<Self, RunError> {
-        if !path.is_dir() {
-            let config = ExperimentConfig::load(path, set)?;
-            let model = config.model.untrained(&config.data).ok_or_else(|| {
-                let path = path.display();
-                RunError::Refused(format!(
-                    "{path} describes a model that is trained; train it with `keydance train \
-                         {path} --data DIR --out RUN_DIR` and give RUN_DIR instead"
-                ))
-            })?;
-            return Ok(Self {
-                what: format!("{} of {}", config.name, path.display()),
-                config,
-                model,
-                run: None,
-            });
-        }
-        let run = RunFolder::open(path);
-        if !run.config_path().exists() {
+        let run = path.is_dir().then(|| RunFolder::open(path));
+        let file = run.as_ref().map_or(path.into(), RunFolder::config_path);
+        let path = path.display();
+        if run.is_some() && !file.exists() {
             return Err(RunError::Refused(format!(
-                "{} is not a run's folder: it has no {}; `keydance train` makes one",
-                path.display(),
+                "{path} is not a run's folder: it has no {}; `keydance train` makes one",
                 RunFolder::CONFIG
             )));
         }
-        let config = ExperimentConfig::load(&run.config_path(), set)?;
-        let (model, what) = match config.model.untrained(&config.data) {
-            Some(model) => (model, format!("{} of {}", config.name, path.display())),
-            None => {
+        let config = ExperimentConfig::load(&file, set)?;
+        let (model, source) = match (config.model.untrained(&config.data), &run) {
+            (Some(model), _) => (model, format!(" of {path}")),
+            (None, Some(run)) => {
                 let weights = run.newest_weights()?;
-                let what = format!("{}, {}", config.name, weights.display());
-                (run.trained_model(&config)?, what)
+                (
+                    run.trained_model(&config)?,
+                    format!(", {}", weights.display()),
+                )
+            }
+            (None, None) => {
+                return Err(RunError::Refused(format!(
+                    "{path} describes a model that is trained; train it with `keydance train \
+                     {path} --data DIR --out RUN_DIR` and give RUN_DIR instead"
+                )));
             }
         };
         Ok(Self {
+            what: format!("{}{source}", config.name),
             config,
             model,
-            what,
-            run: Some(run),
+            run,
         })
     }
 

@@ -29,10 +29,12 @@ impl RunFolder {
         }
     }
 
-    /// The model of `config` with the run's newest weights, and with the statistics that were saved with them.
+    /// The model of `config` with the run's newest weights, and with the statistics that were saved
+    /// with them.
     ///
     /// # Errors
-    /// There are no weights, their file is damaged, or they are those of another model than `config` describes.
+    /// There are no weights, their file is damaged, or they are those of another model than
+    /// `config` describes.
     pub fn trained_model(&self, config: &ExperimentConfig) -> Result<Box<dyn Generator>, RunError> {
         let saved = self.saved_weights(config)?;
         let model = config.model.trained(&config.name, &saved);
@@ -42,7 +44,8 @@ impl RunFolder {
     /// The run's newest weights, for the model of `config`.
     ///
     /// # Errors
-    /// There are none, their file is damaged, or they are those of another model than `config` describes.
+    /// There are none, their file is damaged, or they are those of another model than `config`
+    /// describes.
     pub fn saved_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
         self.read_weights(config)
             .map_err(|error| self.or_other_version(error))

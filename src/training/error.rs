@@ -16,7 +16,8 @@ pub enum TrainingError {
     /// What is asked for cannot be trained: what, and what to do.
     #[error("{0}")]
     Refused(String),
-    /// The training diverged, at this step or, where its cause are the weights, in the update that ended it.
+    /// The training diverged, at this step or, where its cause are the weights, in the update that
+    /// ended it.
     #[error(
         "step {step} ({what}) is not finite: {cause}; the last checkpoint is as it was; \
          try a lower optimiser.learning_rate or optimiser.clip_norm=1.0"

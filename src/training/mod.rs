@@ -1,8 +1,9 @@
 //! Training: the loop over a task's steps.
 //!
-//! An [`ExperimentConfig`](crate::experiment::ExperimentConfig) and a data set make a [`Trainer`]. Its task says what each step
-//! trains; the shards of a step run on tapes of their own, and Adam moves the weights by the sum of their gradients. Everything
-//! that goes on is kept in a [`RunFolder`](crate::run::RunFolder), from which a training goes on to the bit.
+//! An [`ExperimentConfig`](crate::experiment::ExperimentConfig) and a data set make a [`Trainer`].
+//! Its task says what each step trains; the shards of a step run on tapes of their own, and Adam
+//! moves the weights by the sum of their gradients. Everything that goes on is kept in a
+//! [`RunFolder`](crate::run::RunFolder), from which a training goes on to the bit.
 
 mod error;
 pub mod measure;

@@ -18,11 +18,12 @@ pub struct Resumed {
 }
 
 impl Trainer<'_> {
-    /// Takes up the newest whole checkpoint of a run; the damaged ones after it are set aside. Without any checkpoint the
-    /// training is at its beginning.
+    /// Takes up the newest whole checkpoint of a run; the damaged ones after it are set aside.
+    /// Without any checkpoint the training is at its beginning.
     ///
     /// # Errors
-    /// The run is of another config, other data or another model, or there are checkpoints but none is whole.
+    /// The run is of another config, other data or another model, or there are checkpoints but none
+    /// is whole.
     pub fn resume(&mut self, run: &RunFolder) -> Result<Resumed, RunError> {
         self.resume_newest(run)
             .map_err(|error| run.or_other_version(error))

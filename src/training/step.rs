@@ -60,11 +60,12 @@ impl Stepper {
         self.pool.install(run)
     }
 
-    /// Computes the step and moves the weights. Returns the losses before the move, and the norm of the gradient.
+    /// Computes the step and moves the weights. Returns the losses before the move, and the norm of
+    /// the gradient.
     ///
     /// # Errors
-    /// The step is refused by an operation; or a loss or gradient is not finite, and then weights and moments are as before; or
-    /// the weights are not after it.
+    /// The step is refused by an operation; or a loss or gradient is not finite, and then weights
+    /// and moments are as before; or the weights are not after it.
     pub fn step(
         &mut self,
         input: StepInput<'_>,

@@ -46,7 +46,8 @@ impl<'d> Trainer<'d> {
     /// A training of the config's model from its initial weights, on `threads` threads.
     ///
     /// # Errors
-    /// The config is not valid, its model has nothing to train, or the data is not what it can be trained on.
+    /// The config is not valid, its model has nothing to train, or the data is not what it can be
+    /// trained on.
     pub fn new(
         config: ExperimentConfig,
         dataset: &'d Dataset,
@@ -147,14 +148,15 @@ impl<'d> Trainer<'d> {
             .generator(&self.config.name, self.parameters.clone())
     }
 
-    /// Trains from where the training stands to the end of the schedule, or until `observe`, called after every step, breaks.
+    /// Trains from where the training stands to the end of the schedule, or until `observe`, called
+    /// after every step, breaks.
     ///
-    /// With `out`, everything a run's folder holds is written there: a checkpoint at the intervals of the config, where it stops
-    /// and at the end, and then the weights.
+    /// With `out`, everything a run's folder holds is written there: a checkpoint at the intervals
+    /// of the config, where it stops and at the end, and then the weights.
     ///
     /// # Errors
-    /// A loss or gradient that is not finite ([`TrainingError::NonFinite`]; the checkpoints stay as they are), or a file that
-    /// cannot be written.
+    /// A loss or gradient that is not finite ([`TrainingError::NonFinite`]; the checkpoints stay as
+    /// they are), or a file that cannot be written.
     pub fn run(
         &mut self,
         out: Option<&RunFolder>,

@@ -14,7 +14,8 @@ pub struct Validation<'d> {
 }
 
 impl<'d> Validation<'d> {
-    /// None where the config asks for no scores. Refuses what could not be scored, before anything is trained.
+    /// None where the config asks for no scores. Refuses what could not be scored, before anything
+    /// is trained.
     ///
     /// # Errors
     /// No validation clips, or none with more frames than a length.
@@ -56,7 +57,8 @@ impl<'d> Validation<'d> {
         step.is_multiple_of(self.every_steps) || step == steps
     }
 
-    /// Scores a model. Draws no random number and moves no weight: a training is the same to the bit with it and without.
+    /// Scores a model. Draws no random number and moves no weight: a training is the same to the
+    /// bit with it and without.
     ///
     /// # Errors
     /// No validation clip is long enough for a length, or the model fails.

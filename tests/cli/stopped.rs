@@ -449,3 +449,26 @@ fn sigkill_at_random_moments_loses_nothing() {
         number("KEYDANCE_KILL_SEED", 1),
     );
 }
+
+#[test]
+fn the_command_to_resume_quotes_what_a_shell_would_change() {
+    let small = SmallRun::new();
+    fs::rename(small.path("small.toml"), small.path("a b.toml")).unwrap();
+    let budget = "[schedule]\nmax_len = 40\nfraction = 1.0\n";
+    fs::write(small.path("budget.toml"), budget).unwrap();
+    let mut child = keydance()
+        .current_dir(small.path("."))
+        .args(["train", "a b.toml", "--data", "data", "--out", "runs/1"])
+        .args(["--budget", "budget.toml", "--set", "name=x"])
+        .args(["--set", "data.split={ share = 0.5 }", "--threads", "2"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_for_log(&mut child, &small.path("runs/1"), 0);
+    kill(&child, "-INT");
+    let text = stderr(&child.wait_with_output().unwrap());
+    let command = "keydance train 'a b.toml' --data data --out runs/1 --budget budget.toml \
+                   --set name=x --set 'data.split={ share = 0.5 }' --threads 2 --resume";
+    assert!(text.lines().any(|line| line.trim() == command), "{text}");
+}

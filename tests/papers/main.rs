@@ -30,3 +30,4 @@ mod tables;
 mod training;
 mod velocity_refinement;
 mod windows;
+mod wording;

@@ -62,16 +62,14 @@ impl TrajectoryArgs {
         mut request: SequenceRequest,
         keyframes: &Keyframes,
     ) -> anyhow::Result<(SequenceRequest, Vec<ControlWarning>)> {
-        for (flag, value) in [
+        let numbers = [
             ("turn", self.turn),
             ("scale", self.scale),
             ("raise", self.raise),
-        ] {
-            if value.is_some_and(|value| value.is_nan() || value.abs() > 1e5) {
-                anyhow::bail!(
-                    "--{flag} {}: expected a number between -100000 and 100000",
-                    value.unwrap_or(0.0)
-                );
+        ];
+        for (flag, value) in numbers {
+            if let Some(value) = value.filter(|value| value.is_nan() || value.abs() > 1e5) {
+                anyhow::bail!("--{flag} {value}: expected a number between -100000 and 100000");
             }
         }
         let trajectory = if let Some(path) = &self.trajectory {

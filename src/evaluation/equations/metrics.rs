@@ -14,13 +14,16 @@ use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 /// How far one predicted window is from the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindowScores {
-    /// The window's term of eq. 12: mean over frames of `||p~^b - p^b||_2`, the norm of the 69-number difference, cm.
+    /// The window's term of eq. 12: mean over frames of `||p~^b - p^b||_2`, the norm of the
+    /// 69-number difference, cm.
     pub body_position: f64,
-    /// g_v, eq. 14: mean over frames and body parts of `|f~ - f^|`, cm/frame. f~ comes from the predicted positions.
+    /// g_v, eq. 14: mean over frames and body parts of `|f~ - f^|`, cm/frame. f~ comes from the
+    /// predicted positions.
     pub velocity_factor: f64,
     /// g_r, eq. 16: mean over frames of `||p~^r - p^^r||_2`, cm.
     pub root: f64,
-    /// How far foot joints move in the world in the frames in which the recorded ones are in contact, summed, cm.
+    /// How far foot joints move in the world in the frames in which the recorded ones are in
+    /// contact, summed, cm.
     pub foot_travel: f64,
     /// Number of these: foot joints and frames.
     pub foot_contacts: usize,
@@ -28,18 +31,21 @@ pub struct WindowScores {
 
 /// Measures a prediction against the recorded window.
 ///
-/// `recorded`: `[N + 1, 154]`, frames k1 to k2, not standardised; its root positions and velocity factors are the ones that
-/// were asked for (p^^r and f^). `predicted`: N frames, k1 + 1 to k2. The velocity factors f~ (eq. 1) are those of the differences of
-/// predicted positions, p^b and p^r, from frame to frame; the frame before k1 + 1 is the recorded k1. The predicted
-/// velocities are not looked at.
+/// `recorded`: `[N + 1, 154]`, frames k1 to k2, not standardised; its root positions and velocity
+/// factors are the ones that were asked for (p^^r and f^). `predicted`: N frames, k1 + 1 to k2. The
+/// velocity factors f~ (eq. 1) are those of the differences of predicted positions, p^b and p^r,
+/// from frame to frame; the frame before k1 + 1 is the recorded k1. The predicted velocities are
+/// not looked at.
 ///
-/// Foot skate is measured where the recorded window has contact labels, from the predicted positions of one frame to the next: the same
-/// frames for every model, and no model gains by calling its own feet lifted. A model that sets its feet down at other times than the dancer
-/// is charged for that.
+/// Foot skate is measured where the recorded window has contact labels, from the predicted
+/// positions of one frame to the next: the same frames for every model, and no model gains by
+/// calling its own feet lifted. A model that sets its feet down at other times than the dancer is
+/// charged for that.
 ///
 /// # Errors
 ///
-/// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two do not fit together.
+/// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two do
+/// not fit together.
 pub fn window_scores(
     recorded: ArrayView2<f64>,
     predicted: ArrayView2<f64>,
@@ -101,18 +107,19 @@ pub fn window_scores(
     })
 }
 
-/// Foot skate over the windows of one length: mean distance (cm/frame) that a foot joint moves in a frame in which the recorded one is in
-/// contact. None where no window has a contact.
+/// Foot skate over the windows of one length: mean distance (cm/frame) that a foot joint moves in a
+/// frame in which the recorded one is in contact. None where no window has a contact.
 pub fn foot_skate(windows: &[WindowScores]) -> Option<f64> {
     let travel: f64 = windows.iter().map(|window| window.foot_travel).sum();
     let contacts: usize = windows.iter().map(|window| window.foot_contacts).sum();
     (contacts > 0).then(|| travel / contacts as f64)
 }
 
-/// Means over the windows of one length: LRP (cm, eq. 12), AVF (share, eq. 13) and ART (share, eq. 15), in this order.
+/// Means over the windows of one length: LRP (cm, eq. 12), AVF (share, eq. 13) and ART (share, eq.
+/// 15), in this order.
 ///
-/// A window counts for AVF where g_v is strictly below `delta_v` (cm/frame), for ART where g_r is strictly below `delta_r` (cm).
-/// No windows give NaN.
+/// A window counts for AVF where g_v is strictly below `delta_v` (cm/frame), for ART where g_r is
+/// strictly below `delta_r` (cm). No windows give NaN.
 pub fn means(windows: &[WindowScores], delta_v: f64, delta_r: f64) -> [f64; 3] {
     let count = windows.len() as f64;
     let share = |hit: &dyn Fn(&WindowScores) -> bool| {

@@ -1,4 +1,5 @@
-//! The protocol `equations`: LRP, AVF and ART of Pan et al. 2021 as the paper's equations 12 to 16 define them.
+//! The protocol `equations`: LRP, AVF and ART of Pan et al. 2021 as the paper's equations 12 to 16
+//! define them.
 
 mod metrics;
 mod window_request;
@@ -47,12 +48,12 @@ const METRICS: [Metric; 4] = [
     },
 ];
 
-/// The protocol behind tables 2 to 4. The default is the paper's; scores of other lengths or thresholds are not comparable with
-/// it.
+/// The protocol behind tables 2 to 4. The default is the paper's; scores of other lengths or
+/// thresholds are not comparable with it.
 ///
-/// For each N, windows of N + 1 frames start every ceil(0.1 (N + 1)) frames of each clip. A model is given frame k1 (the first),
-/// the keyframe k2 (the last), root trajectory and velocity factors, and predicts the N frames k1 + 1 to k2. What is scored is
-/// its raw output, `[N, 149]`.
+/// For each N, windows of N + 1 frames start every ceil(0.1 (N + 1)) frames of each clip. A model
+/// is given frame k1 (the first), the keyframe k2 (the last), root trajectory and velocity factors,
+/// and predicts the N frames k1 + 1 to k2. What is scored is its raw output, `[N, 149]`.
 ///
 /// Foot skate has no score where some length has no contact.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,12 +132,14 @@ impl Equations {
 
     /// Scores a model on all windows of clips that are measured already.
     ///
-    /// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the number of threads and their
-    /// results are added in order, so the scores are the same to the bit on any number of threads.
+    /// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the
+    /// number of threads and their results are added in order, so the scores are the same to the
+    /// bit on any number of threads.
     ///
     /// # Errors
     ///
-    /// [`EvaluationError`]: a length without windows, or a model that fails or gives frames that do not fit.
+    /// [`EvaluationError`]: a length without windows, or a model that fails or gives frames that do
+    /// not fit.
     pub fn evaluate_clips(
         &self,
         model: &dyn Generator,

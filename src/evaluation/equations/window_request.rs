@@ -6,10 +6,11 @@ use crate::models::generator::{Given, Request};
 use crate::motion::Clip;
 use crate::motion::features::{ROOT_POSITION, VELOCITY_FACTORS};
 
-/// The request for the window of `clip` from frame `start` on whose features are `window` (`[N + 1, 154]`, not standardised).
+/// The request for the window of `clip` from frame `start` on whose features are `window`
+/// (`[N + 1, 154]`, not standardised).
 ///
-/// Given are the first frame k1, the last frame k2, and root positions and velocity factors of all frames. Nothing else
-/// of the recorded motion goes in. `None` where the clip has no such frames.
+/// Given are the first frame k1, the last frame k2, and root positions and velocity factors of all
+/// frames. Nothing else of the recorded motion goes in. `None` where the clip has no such frames.
 pub fn window_request(clip: &Clip, start: usize, window: ArrayView2<f64>) -> Option<Request> {
     let length = window.nrows().checked_sub(1)?;
     let given = |frame: usize| {

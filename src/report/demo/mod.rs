@@ -14,7 +14,7 @@ use std::path::Path;
 
 use super::ReportError;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{EvaluatedData, EvaluationRecord, PrintedTables, TableRow, Tables};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, TableRow, Tables};
 use crate::run::{FileError, remove_file, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
@@ -66,11 +66,9 @@ pub fn write_scores(
     settings: &DemoSettings,
     dataset: &Dataset,
     comparison: &Comparison,
-    printed: &PrintedTables,
+    tables: Tables<'_>,
     rows: &[TableRow],
 ) -> Result<(), ReportError> {
-    let protocol = settings.experiment.protocol();
-    let metrics = protocol.metrics();
     let choreography = &settings.choreography;
     let subject = format!(
         "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not \
@@ -80,8 +78,7 @@ pub fn write_scores(
         choreography.frames_per_clip,
         choreography.seed
     );
-    let text = Tables { metrics, printed }.markdown(rows, &subject);
-    replace_file(&folder.join(TABLES), text)?;
+    replace_file(&folder.join(TABLES), tables.markdown(rows, &subject))?;
     write_json(&folder.join(INTERPOLATION), &comparison.interpolation)?;
     write_json(&folder.join(UNTRAINED), &comparison.untrained)?;
     EvaluationRecord {

@@ -1,7 +1,8 @@
 //! The motion viewer: motions in 3D as one HTML page that opens from disk and needs no network.
 //!
-//! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as JSON. Nothing that a user wrote becomes
-//! markup: names are escaped in the page's title, and inside the JSON no `<` is left that could end its element.
+//! The page is `viewer.html` with its style and scripts put in; what the motions say goes in as
+//! JSON. Nothing that a user wrote becomes markup: names are escaped in the page's title, and
+//! inside the JSON no `<` is left that could end its element.
 
 #[cfg(feature = "papers")]
 mod generated;
@@ -51,7 +52,8 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame. Panics on fewer columns.
+    /// From arrays: root positions `[frames, 3]`, cm, and velocity factors `[frames, 5]`, cm/frame.
+    /// Panics on fewer columns.
     pub fn new(root_trajectory: ArrayView2<f64>, velocity_factors: ArrayView2<f64>) -> Self {
         let factors = |row: ArrayView1<f64>| std::array::from_fn(|part| row[part]);
         Self {
@@ -95,7 +97,8 @@ pub struct ViewerKeyframe {
 }
 
 impl ViewerMotion {
-    /// A motion from its frames' numbers, `[frames, 149 or 154]`, not standardised. Velocity factors are measured on the positions.
+    /// A motion from its frames' numbers, `[frames, 149 or 154]`, not standardised. Velocity
+    /// factors are measured on the positions.
     pub fn from_features(
         name: impl Into<String>,
         kind: MotionKind,
@@ -115,7 +118,8 @@ impl Viewer {
     /// The page.
     ///
     /// # Errors
-    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a keyframe outside, a NaN or infinity.
+    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a
+    /// keyframe outside, a NaN or infinity.
     pub fn html(&self) -> Result<String, FigureError> {
         self.check()?;
         let frames = self.frames();
@@ -177,27 +181,19 @@ impl Viewer {
             let (contacts, factors) = (motion.contacts.len(), motion.velocity_factors.len());
             [motion.positions.len(), contacts, factors].map(|rows| (motion.name.as_str(), rows))
         });
-        let asked = self.asked.iter().flat_map(|asked| {
-            let (places, factors) = (asked.root_trajectory.len(), asked.velocity_factors.len());
-            [
-                ("the root trajectory", places),
-                ("the velocity factors", factors),
-            ]
-        });
+        let asked = self.asked.iter();
+        let places = asked.map(|asked| ("the root trajectory", asked.root_trajectory.len()));
+        let asked = self.asked.iter();
+        let factors = asked.map(|asked| ("the velocity factors", asked.velocity_factors.len()));
+        let asked = places.chain(factors);
         if let Some((row, found)) = motions.chain(asked).find(|(_, count)| *count != frames) {
-            return Err(FigureError::Frames {
-                figure: self.title.clone(),
-                row: row.into(),
-                found,
-                expected: frames,
-            });
+            return Err(FigureError::frames(&self.title, row, found, frames));
         }
         if let Some(keyframe) = self.keyframes.iter().find(|key| key.frame >= frames) {
-            return Err(FigureError::Keyframe {
-                figure: self.title.clone(),
-                frame: keyframe.frame,
-                frames,
-            });
+            return Err(FigureError::Unfit(format!(
+                "{:?}: keyframe {} lies outside its {frames} frames, which are numbered from 0",
+                self.title, keyframe.frame
+            )));
         }
         self.check_numbers()
     }
@@ -214,13 +210,10 @@ impl Viewer {
         if !self.keyframes.iter().all(|key| places(&key.positions)) {
             return Err(self.not_finite("a keyframe"));
         }
-        match &self.asked {
-            Some(asked)
-                if !(places(&asked.root_trajectory) && factors(&asked.velocity_factors)) =>
-            {
-                Err(self.not_finite("what was asked for"))
-            }
-            _ => Ok(()),
+        let mut asked = self.asked.iter();
+        match asked.all(|it| places(&it.root_trajectory) && factors(&it.velocity_factors)) {
+            true => Ok(()),
+            false => Err(self.not_finite("what was asked for")),
         }
     }
 

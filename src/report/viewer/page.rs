@@ -15,7 +15,8 @@ const SCRIPTS: [&str; 5] = [
     include_str!("player.js"),
 ];
 
-/// The template with its places filled: `{{title}}`, `{{style}}`, `{{data}}`, `{{script}}`. What is put in is not looked at again.
+/// The template with its places filled: `{{title}}`, `{{style}}`, `{{data}}`, `{{script}}`. What is
+/// put in is not looked at again.
 pub(super) fn page(title: &str, data: &impl Serialize) -> String {
     let mut page = String::with_capacity(1 << 16);
     let mut rest = TEMPLATE;

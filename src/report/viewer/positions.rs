@@ -12,7 +12,8 @@ use crate::motion::skeleton::JOINTS;
 pub(super) struct Steps {
     /// cm.
     origin: [f64; 3],
-    /// cm: 1/64, or more where that does not reach to all of the motion (beyond 5 m from its middle).
+    /// cm: 1/64, or more where that does not reach to all of the motion (beyond 5 m from its
+    /// middle).
     step: f64,
     /// Little-endian i16 in base64, `[frames * 24 * 3]`.
     steps: String,

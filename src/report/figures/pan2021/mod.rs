@@ -5,7 +5,7 @@ mod lengths;
 mod root;
 mod stage;
 mod velocity;
-mod wording;
+pub mod wording;
 
 use super::{DrawnFigures, Figure, FigureRequest};
 use crate::models::baselines::interpolation::Interpolation;

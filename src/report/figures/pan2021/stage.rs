@@ -41,18 +41,24 @@ pub struct Generated {
 }
 
 impl<'d> Stage<'d> {
-    /// The window in the middle of every clip that is long enough, in the order of the names, the
-    /// chosen one before them.
+    /// The window of the asked length in the middle of every clip that is long enough, in the order
+    /// of the names; before them that of the asked clip and start, if any.
     ///
     /// # Errors
     /// No clip is long enough; the chosen one is not there or has no such window.
-    pub fn new(clips: &'d [DanceClip], choice: &FigureRequest<'_>) -> Result<Self, ReportError> {
-        let needed = choice.length + 1;
+    pub fn new(clips: &'d [DanceClip], asked: &FigureRequest<'_>) -> Result<Self, ReportError> {
+        let FigureRequest {
+            length,
+            clip,
+            start,
+            ..
+        } = *asked;
+        let needed = length + 1;
         let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
         let mut fitting: Vec<&DanceClip> = fitting.collect();
         fitting.sort_by(|a, b| a.name.cmp(&b.name));
         let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
-        let first = match choice.clip {
+        let first = match clip {
             None => 0,
             Some(name) => fitting
                 .iter()
@@ -67,15 +73,14 @@ impl<'d> Stage<'d> {
         };
         if fitting.is_empty() {
             return Err(ReportError::Refused(format!(
-                "no test clip has the {needed} frames of --length {} (the longest has {longest})",
-                choice.length
+                "no test clip has the {needed} frames of --length {length} (the longest has {longest})"
             )));
         }
         fitting[..=first].rotate_right(1);
         let mut windows = Vec::with_capacity(fitting.len());
         for (index, clip) in fitting.into_iter().enumerate() {
             let last = clip.frames() - needed;
-            let start = match choice.start {
+            let start = match start {
                 Some(start) if index == 0 => start,
                 _ => last / 2,
             };
@@ -90,8 +95,8 @@ impl<'d> Stage<'d> {
             windows.push(Window {
                 clip,
                 start,
-                recorded: window_features(&clip.features, start, choice.length),
-                request: SequenceRequest::from_clip(clip, &[start, start + choice.length])?,
+                recorded: window_features(&clip.features, start, length),
+                request: SequenceRequest::from_clip(clip, &[start, start + length])?,
             });
         }
         Ok(Self { windows })

@@ -27,23 +27,3 @@ pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().collect();
     values.iter().sum::<f64>() / values.len() as f64
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_verdict_says_none_all_or_how_many() {
-        let text = |measured: [f64; 3]| {
-            let responses = measured.map(|measured| Response {
-                asked: 3.0,
-                measured,
-            });
-            verdict("M", "the speed", &responses)
-        };
-        assert!(text([0.9, -3.0, 0.0]).starts_with("M does not follow the speed"));
-        assert!(text([1.1, 3.0, 2.0]).starts_with("M follows the speed"));
-        assert!(text([1.1, 3.0, 0.2]).ends_with("in 2 of 3 cases only"));
-        assert_eq!(percent(-0.001), "0\u{a0}%");
-    }
-}

@@ -1,21 +1,25 @@
-//! The loss curve of a training: the total and its terms over frame-steps.
+//! Curves over the course of a training: its losses, and its scores on validation clips.
 
 use super::FigureError;
 use super::chart::{Axis, Chart, Line, Scale};
+use super::score_figure::metric_axis;
+use crate::evaluation::Metric;
 
 /// The total loss or one of its terms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LossSeries {
     /// Its name in the legend, such as `L_rec`.
     pub name: String,
-    /// `(frame-steps, loss)`: predicted frames that the training had gone through, and the mean loss since the point before.
+    /// `(frame-steps, loss)`: predicted frames that the training had gone through, and the mean
+    /// loss since the point before.
     pub points: Vec<(f64, f64)>,
 }
 
 /// At most this many points of a line are drawn; more are averaged in equal runs.
 const POINTS: usize = 300;
 
-/// Draws losses over frame-steps, the first series as the total; the loss axis is logarithmic, and a loss of 0 has no place on it.
+/// Draws losses over frame-steps, the first series as the total; the loss axis is logarithmic, and
+/// a loss of 0 has no place on it.
 ///
 /// `title` stands above, such as "whole_model, 1.2 M frame-steps".
 ///
@@ -53,4 +57,32 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             (mean(|point| point.0), mean(|point| point.1))
         })
         .collect()
+}
+
+/// Draws a metric on validation clips over frame-steps: for each column of its table, such as a
+/// length N in frames, a line through `(frame-steps, score)`, ascending in frame-steps.
+///
+/// # Errors
+///
+/// [`FigureError`]: no points, or a NaN or infinity.
+pub fn validation_curve(
+    title: &str,
+    metric: &Metric,
+    columns: Vec<(&str, Vec<(f64, f64)>)>,
+) -> Result<String, FigureError> {
+    let lines = columns.into_iter().enumerate();
+    let lines = lines.map(|(colour, (column, points))| Line {
+        name: format!("N = {column}"),
+        dots: points.len() <= 30,
+        emphasised: true,
+        ..Line::plain(points, colour)
+    });
+    Chart {
+        title: title.to_string(),
+        caption: String::new(),
+        x: Axis::linear("training (frame-steps)"),
+        y: Axis::linear(&metric_axis(metric)),
+        lines: lines.collect(),
+    }
+    .svg()
 }

@@ -1,0 +1,168 @@
+//! `keydance bench-step`, `bench-layers`, `bench-generate`: how fast this machine computes.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::experiment::ExperimentConfig;
+use crate::models::transition::ModelConfig;
+use crate::models::transition::measure::MeasuredGeneration;
+use crate::nn::measure::{Measured, MeasuredLayers};
+use crate::training::measure::step_speed;
+
+/// Frames of the generated transitions.
+const FRAMES: usize = 60;
+
+/// What is timed.
+#[derive(Debug, Args)]
+pub struct StepArgs {
+    /// Config of an experiment; without one, the first paper's whole model
+    config: Option<PathBuf>,
+    /// Override a key of the config; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Frames of a transition
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
+    frames: u16,
+    /// Windows in the batch
+    #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
+    batch: u16,
+    /// Parts that the batch is computed in [default: the paper config's]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    shards: Option<u16>,
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Timed steps; the fastest counts
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    repetitions: u16,
+    /// Print one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is timed.
+#[derive(Debug, Args)]
+pub struct LayersArgs {
+    /// Threads that share the batch
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=128))]
+    threads: u16,
+    /// Timed steps; the fastest counts
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    repetitions: u16,
+    /// Print one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is timed.
+#[derive(Debug, Args)]
+pub struct GenerateArgs {
+    /// Transitions generated at once
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    batch: u16,
+    /// Threads that share the batch
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Timed generations; the fastest counts
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    repetitions: u16,
+    /// Print one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Times the step of a config's model.
+///
+/// # Errors
+/// The config cannot be used, or no threads are to be had.
+pub fn step(args: StepArgs) -> anyhow::Result<()> {
+    let mut sets = args.set;
+    sets.extend(args.shards.map(|it| format!("schedule.shards={it}")));
+    let config = match &args.config {
+        Some(path) => ExperimentConfig::load(path, &sets)?,
+        None => ExperimentConfig::with_sets(&sets)?,
+    };
+    let speed = step_speed(
+        &config,
+        args.frames.into(),
+        args.batch.into(),
+        args.threads.into(),
+        args.repetitions.into(),
+    )?;
+    let text = format!(
+        "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
+        speed.batch, speed.frames, speed.threads, speed.seconds, speed.frame_steps_per_second
+    );
+    print(args.json, &speed, &text)
+}
+
+/// Times forward and backward of the model's layers by themselves.
+///
+/// # Errors
+/// No threads to be had.
+pub fn layers(args: LayersArgs) -> anyhow::Result<()> {
+    let threads = args.threads;
+    let milliseconds = |measured| -> anyhow::Result<f64> {
+        let mut layers = MeasuredLayers::new(measured, threads.into())?;
+        Ok(1e3 * fastest(args.repetitions, || Ok(layers.run()?))?)
+    };
+    let lstm = milliseconds(Measured::Lstm)?;
+    let encoder = milliseconds(Measured::EncoderLayers)?;
+    let result = serde_json::json!({
+        "threads": threads,
+        "lstm_ms": lstm,
+        "encoder_layers_ms": encoder,
+    });
+    let text = format!(
+        "{threads} threads: LSTM 1024 -> 256 and linear, 128 x 30: {lstm:.1} ms; two encoder \
+         layers, 128 windows of 7: {encoder:.1} ms"
+    );
+    print(args.json, &result, &text)
+}
+
+/// Times the generation of transitions of 60 frames by the paper's whole model, without a tape that
+/// records.
+///
+/// # Errors
+/// No threads to be had.
+pub fn generate(args: GenerateArgs) -> anyhow::Result<()> {
+    let (batch, threads) = (usize::from(args.batch), usize::from(args.threads));
+    let mut generation = MeasuredGeneration::new(&ModelConfig::default(), FRAMES, batch, threads)?;
+    let seconds = fastest(args.repetitions, || Ok(generation.run()?))?;
+    let ms_per_frame = seconds * 1e3 / FRAMES as f64;
+    let frames_per_second = (FRAMES * batch) as f64 / seconds;
+    let result = serde_json::json!({
+        "batch": batch,
+        "threads": threads,
+        "ms_per_frame": ms_per_frame,
+        "frames_per_second": frames_per_second,
+    });
+    let text = format!(
+        "generation, {batch} at once, {threads} threads: {ms_per_frame:.2} ms a frame, \
+         {frames_per_second:.0} frames/s"
+    );
+    print(args.json, &result, &text)
+}
+
+/// Seconds of the fastest run of `repetitions`, after one to warm up.
+fn fastest(
+    repetitions: u16,
+    mut run: impl FnMut() -> anyhow::Result<Duration>,
+) -> anyhow::Result<f64> {
+    run()?;
+    let mut seconds = f64::INFINITY;
+    for _ in 0..repetitions {
+        seconds = seconds.min(run()?.as_secs_f64());
+    }
+    Ok(seconds)
+}
+
+/// Prints a result as a line of JSON or as text.
+fn print(json: bool, result: &impl Serialize, text: &str) -> anyhow::Result<()> {
+    let json = json.then(|| serde_json::to_string(result)).transpose()?;
+    writeln!(std::io::stdout(), "{}", json.as_deref().unwrap_or(text))?;
+    Ok(())
+}
