@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
 use keydance::models::pan2021::{Controllers, Pan2021, Pan2021Config};
 use keydance::models::transition::gradient_check::generated_batch;
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::transition::{Batch, Forcing, Network};
 use keydance::nn::Initialiser;
 use keydance::optim::{Adam, AdamConfig};
 use ndarray::s;
@@ -71,7 +71,7 @@ struct Step {
 }
 
 /// Steps on batches of these numbers of windows.
-fn steps(config: &Pan2021Config, feed: Feed, windows: &[usize]) -> Vec<Step> {
+fn steps(config: &Pan2021Config, forcing: Forcing, windows: &[usize]) -> Vec<Step> {
     let _counting = COUNTING.lock().unwrap();
     let most = windows.iter().copied().max().unwrap();
     let (whole, standardisation) = generated_batch(12, most, 3).unwrap();
@@ -91,7 +91,7 @@ fn steps(config: &Pan2021Config, feed: Feed, windows: &[usize]) -> Vec<Step> {
     let steps = batches.iter().enumerate().map(|(step, batch)| {
         let before = LARGE_BYTES.load(Ordering::Relaxed);
         let mut tape = Tape::recording(&parameters, &mut workspace).with_dropout(step as u64);
-        let total = network.losses(&mut tape, batch, feed).unwrap().total;
+        let total = network.losses(&mut tape, batch, forcing).unwrap().total;
         tape.backward(total, &mut gradients[0]).unwrap();
         adam.step(&mut parameters, &mut gradients, 1e-4).unwrap();
         Step {
@@ -119,23 +119,23 @@ fn a_training_step_allocates_nothing_large_after_the_first_two() {
         ..small_model()
     };
     for config in [small_model(), condition_fc] {
-        for feed in [Feed::Predictions, Feed::GroundTruth] {
-            let steps = steps(&config, feed, &[32; 5]);
+        for forcing in [Forcing::FreeRunning, Forcing::Teacher] {
+            let steps = steps(&config, forcing, &[32; 5]);
             let bytes: Vec<usize> = steps.iter().map(|step| step.large_bytes).collect();
             assert!(
                 bytes[0] > LARGE,
                 "the first step fills the workspace: {bytes:?}"
             );
-            assert_eq!(bytes[2..], [0, 0, 0], "{feed:?}: {bytes:?}");
+            assert_eq!(bytes[2..], [0, 0, 0], "{forcing:?}: {bytes:?}");
         }
     }
 }
 
 #[test]
 fn batches_of_changing_sizes_share_their_buffers() {
-    let of_one_size = steps(&small_model(), Feed::Predictions, &[32; 3]);
+    let of_one_size = steps(&small_model(), Forcing::FreeRunning, &[32; 3]);
     let sizes = [32, 16, 9, 13, 4, 25, 32, 7, 11, 20];
-    let changing = steps(&small_model(), Feed::Predictions, &sizes);
+    let changing = steps(&small_model(), Forcing::FreeRunning, &sizes);
     let (one, all) = (of_one_size[2].held, changing[sizes.len() - 1].held);
     // Without sharing about the sum of the sizes over the largest one, 5 times.
     assert!(all < 2 * one, "{all} numbers against {one}");

@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::data::Dataset;
 use crate::models::transition::exported_batch::{ExportError, ExportedBatch, export_batch};
-use crate::models::transition::{DanceClip, Feed, TransitionSettings};
+use crate::models::transition::{DanceClip, Forcing, TransitionSettings};
 use crate::run::{RunFolder, replace_file};
 
 #[derive(Debug, Args)]
@@ -45,9 +45,9 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let batch = ExportedBatch {
         frames: args.frames.into(),
         windows: args.windows.into(),
-        feed: match args.ground_truth {
-            true => Feed::GroundTruth,
-            false => Feed::Predictions,
+        forcing: match args.ground_truth {
+            true => Forcing::Teacher,
+            false => Forcing::FreeRunning,
         },
     };
     match export_batch(&model, settings.model.root_frame(), &clips, &batch) {

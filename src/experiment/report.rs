@@ -13,7 +13,7 @@ use super::{ReproduceError, Reproduction};
 use crate::data::hexadecimal;
 use crate::evaluation::{EvaluationRecord, TableRow, Tables};
 use crate::report::{NO_TRAINING, schedule_note, score_figure};
-use crate::run::{FileError, Manifest as RunManifest, RunState, replace_file, write_json};
+use crate::run::{FileError, Manifest, RunState, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const MANIFEST: &str = "manifest.json";
@@ -24,12 +24,12 @@ struct Reported<'r> {
     record: Option<EvaluationRecord>,
     results: RowResults,
     /// Of the training whose scores there are; without scores, of the training as far as it is.
-    manifest: Option<RunManifest>,
+    manifest: Option<Manifest>,
 }
 
 /// `manifest.json` of all results.
 #[derive(Serialize)]
-struct Manifest<'r> {
+struct ResultsManifest<'r> {
     /// Digest of the data that all rows were trained and evaluated on.
     data_digest: &'r str,
     /// Version of keydance that wrote this, and its commit where it was built in a git checkout.
@@ -81,7 +81,7 @@ impl Reproduction<'_> {
         }
         files.extend(rows.iter().flat_map(|reported| reported.results.files()));
         let manifest_rows = rows.iter().zip(&table_rows);
-        let manifest = Manifest {
+        let manifest = ResultsManifest {
             data_digest: &self.dataset.digest,
             version: env!("CARGO_PKG_VERSION"),
             commit: option_env!("KEYDANCE_COMMIT"),

@@ -33,7 +33,7 @@ const TEXT: [usize; 4] = [0, 1, 2, 11];
 /// The runs at and below a folder, by their paths; its `Display` is a table, and a line for each
 /// thing that is wrong with a run.
 pub struct RunTable {
-    rows: Vec<Row>,
+    rows: Vec<RunLine>,
 }
 
 impl RunTable {
@@ -45,7 +45,9 @@ impl RunTable {
         let mut folders = Vec::new();
         find(folder, DEEPEST, &mut folders)?;
         folders.sort_unstable();
-        let rows = folders.iter().map(|run| Row::read(run, name(run, folder)));
+        let rows = folders
+            .iter()
+            .map(|run| RunLine::read(run, name(run, folder)));
         Ok(Self {
             rows: rows.collect(),
         })
@@ -113,12 +115,12 @@ fn name(run: &Path, folder: &Path) -> String {
 }
 
 /// A line of the table, and what is wrong with the run.
-struct Row {
+struct RunLine {
     cells: [String; HEADER.len()],
     problems: Vec<String>,
 }
 
-impl Row {
+impl RunLine {
     fn read(folder: &Path, name: String) -> Self {
         let mut row = Self {
             cells: Default::default(),

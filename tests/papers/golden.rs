@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
 use keydance::models::pan2021::{Pan2021, Pan2021Config};
 use keydance::models::transition::Standardisation;
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::transition::{Batch, Forcing, Network};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, ArrayD, Axis, IxDyn};
 use rand::SeedableRng;
@@ -104,19 +104,19 @@ fn assert_close<'a>(what: &str, ours: impl Iterator<Item = &'a f64>, recorded: &
     }
 }
 
-fn check(transition: usize, feed: Feed) {
+fn check(transition: usize, forcing: Forcing) {
     let golden = Golden::read();
     let (network, parameters) = golden.model();
-    let feed_name = match feed {
-        Feed::GroundTruth => "fed",
-        Feed::Predictions => "own",
+    let feed_name = match forcing {
+        Forcing::Teacher => "fed",
+        Forcing::FreeRunning => "own",
     };
     let case = format!("n{transition}_{feed_name}");
     let batch = Batch::of(golden.window(transition));
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&parameters);
     let mut tape = Tape::recording(&parameters, &mut workspace);
-    let losses = network.losses(&mut tape, &batch, feed).unwrap();
+    let losses = network.losses(&mut tape, &batch, forcing).unwrap();
 
     let recorded = golden.numbers(&format!("{case}.terms"));
     assert_eq!(golden.terms.len(), losses.terms.len() + 1);
@@ -156,7 +156,7 @@ fn check(transition: usize, feed: Feed) {
     }
     assert_eq!(start, golden.numbers(&format!("{case}.gradients")).len());
 
-    if feed == Feed::Predictions {
+    if forcing == Forcing::FreeRunning {
         let mut tape = Tape::inference(&parameters, &mut workspace);
         let predicted = network.predict(&mut tape, &batch).unwrap();
         let recorded = golden.numbers(&format!("{case}.outputs"));
@@ -166,20 +166,20 @@ fn check(transition: usize, feed: Feed) {
 
 #[test]
 fn a_long_window_on_own_predictions_agrees_with_pytorch() {
-    check(12, Feed::Predictions);
+    check(12, Forcing::FreeRunning);
 }
 
 #[test]
 fn a_long_window_fed_with_the_truth_agrees_with_pytorch() {
-    check(12, Feed::GroundTruth);
+    check(12, Forcing::Teacher);
 }
 
 #[test]
 fn a_window_of_at_most_2m_frames_on_own_predictions_agrees_with_pytorch() {
-    check(6, Feed::Predictions);
+    check(6, Forcing::FreeRunning);
 }
 
 #[test]
 fn a_window_of_at_most_2m_frames_fed_with_the_truth_agrees_with_pytorch() {
-    check(6, Feed::GroundTruth);
+    check(6, Forcing::Teacher);
 }

@@ -17,7 +17,7 @@ use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
 use keydance::models::transition::gradient_check::{GradientCase, check_model, generated_batch};
-use keydance::models::transition::{Batch, Feed, Network, PoseWindows};
+use keydance::models::transition::{Batch, Forcing, Network, PoseWindows};
 use keydance::motion::DANCE_PARENTS;
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, FACING, FRAME, ROOT_POSITION, ROOT_VELOCITY,
@@ -110,7 +110,7 @@ fn the_gradients_of_network_and_critics_are_those_of_central_differences_of_thei
         for (transition, dropout) in [(12, true), (6, false)] {
             let case = GradientCase {
                 transition,
-                feed: Feed::Predictions,
+                forcing: Forcing::FreeRunning,
                 dropout,
             };
             let options = GradientCheckOptions {
@@ -146,7 +146,7 @@ fn losses(built: &Built<f64>, batches: &[Batch<f64>], dropout: Option<u64>) -> L
         tape.set_dropout(dropout);
         let losses = built
             .network
-            .losses(&mut tape, batch, Feed::Predictions)
+            .losses(&mut tape, batch, Forcing::FreeRunning)
             .unwrap();
         for (name, var) in losses.terms.into_iter().chain([("total", losses.total)]) {
             *values.entry(name).or_insert(0.0) += tape.values(var)[0];
@@ -514,7 +514,7 @@ fn the_network_learns_one_window_by_heart() {
         let mut tape = Tape::recording(&built.parameters, &mut workspace);
         let losses = built
             .network
-            .losses(&mut tape, &batch, Feed::Predictions)
+            .losses(&mut tape, &batch, Forcing::FreeRunning)
             .unwrap();
         let term = losses.terms.iter().find(|(name, _)| *name == "position");
         position.push(tape.values(term.unwrap().1)[0]);
@@ -567,7 +567,7 @@ fn training_is_the_same_to_the_bit_on_any_threads_and_after_a_resume() {
     whole
         .run(None, &mut |report| {
             assert!(report.losses.iter().any(|(name, _)| *name == "critics"));
-            feeds.push(report.column("feed").unwrap() == "predictions");
+            feeds.push(report.column("teacher_forcing").unwrap() == false);
             ControlFlow::Continue(())
         })
         .unwrap();

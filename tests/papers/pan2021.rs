@@ -9,7 +9,7 @@ use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
 use keydance::models::transition::gradient_check::{GradientCase, check_model};
-use keydance::models::transition::{Batch, Feed, Network};
+use keydance::models::transition::{Batch, Forcing, Network};
 use keydance::motion::features::{FEATURES, FRAME};
 use keydance::nn::Initialiser;
 use ndarray::{Array3, Axis, s};
@@ -263,9 +263,9 @@ fn without_velocity_factor_there_is_no_controller_and_no_loss_for_it() {
     );
     assert_eq!(new, Shapes::new());
     assert_eq!(changed, expected(&[("lstm1.weight_ih_l0", &[1024, 768])]));
-    let terms = losses(&without_velocity_factor().small(), Feed::Predictions);
+    let terms = losses(&without_velocity_factor().small(), Forcing::FreeRunning);
     assert!(!terms.contains_key("vfac"));
-    assert!(losses(&whole_model().small(), Feed::Predictions).contains_key("vfac"));
+    assert!(losses(&whole_model().small(), Forcing::FreeRunning).contains_key("vfac"));
 }
 
 #[test]
@@ -275,9 +275,9 @@ fn without_key_loss_only_the_total_changes() {
         (gone, new, changed),
         (Vec::new(), Shapes::new(), Shapes::new())
     );
-    for feed in [Feed::GroundTruth, Feed::Predictions] {
-        let mut whole = losses(&whole_model().small(), feed);
-        let mut ablated = losses(&without_key_loss().small(), feed);
+    for forcing in [Forcing::Teacher, Forcing::FreeRunning] {
+        let mut whole = losses(&whole_model().small(), forcing);
+        let mut ablated = losses(&without_key_loss().small(), forcing);
         let key = 0.2 * whole["key"];
         let (with, without) = (
             whole.remove("total").unwrap(),
@@ -293,13 +293,13 @@ fn without_key_loss_only_the_total_changes() {
 }
 
 /// Terms and total on two windows of 12 frames, without dropout.
-fn losses(config: &Pan2021Config, feed: Feed) -> BTreeMap<&'static str, f64> {
+fn losses(config: &Pan2021Config, forcing: Forcing) -> BTreeMap<&'static str, f64> {
     let (features, standardisation) = generated_windows(12, 2, 5);
     let built: Built<f64> = build(config, &standardisation);
     let mut workspace = Workspace::new();
     let mut tape = Tape::recording(&built.parameters, &mut workspace);
     let batch = Batch::of(features);
-    let losses = built.network.losses(&mut tape, &batch, feed).unwrap();
+    let losses = built.network.losses(&mut tape, &batch, forcing).unwrap();
     let values = losses.terms.into_iter().chain([("total", losses.total)]);
     values
         .map(|(name, var)| (name, tape.values(var)[0]))
@@ -308,7 +308,7 @@ fn losses(config: &Pan2021Config, feed: Feed) -> BTreeMap<&'static str, f64> {
 
 #[test]
 fn the_total_is_the_weighted_sum_of_equation_3() {
-    let terms = losses(&whole_model().small(), Feed::Predictions);
+    let terms = losses(&whole_model().small(), Forcing::FreeRunning);
     let sum = 0.3 * terms["rec"]
         + 0.2 * (terms["bone"] + terms["contact"] + terms["velocity"])
         + 0.15 * terms["root"]
@@ -321,12 +321,13 @@ fn the_total_is_the_weighted_sum_of_equation_3() {
 
 fn gradients_are_right(config: &Pan2021Config) {
     let model = ModelConfig::Pan2021(config.small());
-    for (transition, feed, dropout) in
-        [(12, Feed::Predictions, true), (6, Feed::GroundTruth, false)]
-    {
+    for (transition, forcing, dropout) in [
+        (12, Forcing::FreeRunning, true),
+        (6, Forcing::Teacher, false),
+    ] {
         let case = GradientCase {
             transition,
-            feed,
+            forcing,
             dropout,
         };
         let options = GradientCheckOptions {
@@ -505,7 +506,7 @@ fn predictions_are_the_frames_whose_losses_training_takes() {
         let mut tape = Tape::recording(&built.parameters, &mut workspace);
         let losses = built
             .network
-            .losses(&mut tape, &batch, Feed::Predictions)
+            .losses(&mut tape, &batch, Forcing::FreeRunning)
             .unwrap();
         for (name, ours) in [("rec", rec), ("root", root)] {
             let term = losses
@@ -520,13 +521,17 @@ fn predictions_are_the_frames_whose_losses_training_takes() {
     }
 }
 
-fn gradients_of(built: &Built<f64>, batches: &[Batch<f64>], feed: Feed) -> (f64, Vec<f64>) {
+fn gradients_of(built: &Built<f64>, batches: &[Batch<f64>], forcing: Forcing) -> (f64, Vec<f64>) {
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&built.parameters);
     let mut sum = 0.0;
     for batch in batches {
         let mut tape = Tape::recording(&built.parameters, &mut workspace);
-        let total = built.network.losses(&mut tape, batch, feed).unwrap().total;
+        let total = built
+            .network
+            .losses(&mut tape, batch, forcing)
+            .unwrap()
+            .total;
         sum += tape.values(total)[0];
         tape.backward(total, &mut gradients).unwrap();
     }
@@ -545,9 +550,9 @@ fn shards_on_tapes_of_their_own_add_up_to_the_batch() {
         total_windows: 5,
         ..Batch::of(Array3::zeros((0, 0, 0)))
     };
-    for feed in [Feed::GroundTruth, Feed::Predictions] {
-        let (whole, gradient) = gradients_of(&built, &[shard(0..5)], feed);
-        let (sum, added) = gradients_of(&built, &[shard(0..2), shard(2..3), shard(3..5)], feed);
+    for forcing in [Forcing::Teacher, Forcing::FreeRunning] {
+        let (whole, gradient) = gradients_of(&built, &[shard(0..5)], forcing);
+        let (sum, added) = gradients_of(&built, &[shard(0..2), shard(2..3), shard(3..5)], forcing);
         assert!((whole - sum).abs() < 1e-12 * whole);
         let largest = gradient.iter().fold(0f64, |m, x| m.max(x.abs()));
         assert!(largest > 1e-3);

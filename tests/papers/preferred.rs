@@ -10,7 +10,8 @@ use keydance::evaluation::equations::window_request;
 use keydance::models::pan2021::Pan2021Config;
 use keydance::models::transition::DanceClip;
 use keydance::models::transition::{
-    Batch, Feed, Network, SingleFrame, TrainedModel, Transition, TransitionModel, TransitionRequest,
+    Batch, Forcing, Network, SingleFrame, TrainedModel, Transition, TransitionModel,
+    TransitionRequest,
 };
 use keydance::models::transition::{RootFrame, Standardisation, window_features};
 use keydance::motion::features::{FACING, ROOT_POSITION, ROOT_VELOCITY};
@@ -363,7 +364,9 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
     };
     let mut workspace = Workspace::new();
     let mut tape = Tape::recording(&built.parameters, &mut workspace);
-    let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+    let losses = built
+        .network
+        .losses(&mut tape, &batch, Forcing::FreeRunning);
     let terms = losses.unwrap().terms;
     let (_, term) = terms
         .iter()
@@ -376,7 +379,9 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
     );
     for frame in [0, 42] {
         batch.single_frames[2].frame = frame;
-        let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+        let losses = built
+            .network
+            .losses(&mut tape, &batch, Forcing::FreeRunning);
         let error = losses.unwrap_err().to_string();
         let named = format!("frame {frame} of a window");
         assert!(error.contains(&named), "{error}");
@@ -412,7 +417,9 @@ fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_
         };
         let mut workspace = Workspace::new();
         let mut tape = Tape::recording(&built.parameters, &mut workspace);
-        let losses = built.network.losses(&mut tape, &batch, Feed::Predictions);
+        let losses = built
+            .network
+            .losses(&mut tape, &batch, Forcing::FreeRunning);
         let terms = losses.unwrap().terms;
         let term = terms.iter().find(|(name, _)| *name == "single_frames");
         tape.values(term.unwrap().1)[0]

@@ -6,7 +6,7 @@ use keydance::data::{Dataset, Recording};
 use keydance::experiment::ExperimentConfig;
 use keydance::models::settings::InitialRng;
 use keydance::models::transition::{
-    Batch, DanceClip, Feed, Network, Schedule, TransitionSettings, TransitionTask,
+    Batch, DanceClip, Forcing, Network, Schedule, TransitionSettings, TransitionTask,
 };
 use keydance::models::{LossTerms, Streams};
 use keydance::motion::features::{FEATURES, FRAME};
@@ -45,7 +45,7 @@ impl<T: Real> Network<T> for Recurrence {
         &self,
         tape: &mut Tape<'_, T>,
         batch: &Batch<T>,
-        feed: Feed,
+        forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
         let frames = batch.features.len_of(Axis(0));
         let frame = |t: usize| batch.features.index_axis(Axis(0), t).to_owned().into_dyn();
@@ -71,9 +71,9 @@ impl<T: Real> Network<T> for Recurrence {
                 None => loss,
                 Some(sum) => tape.add(sum, loss)?,
             });
-            current = match feed {
-                Feed::GroundTruth => truth,
-                Feed::Predictions => next,
+            current = match forcing {
+                Forcing::Teacher => truth,
+                Forcing::FreeRunning => next,
             };
         }
         let sum = match sum {

@@ -8,7 +8,7 @@ use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataConfig, Dataset, Split};
 use keydance::experiment::ExperimentConfig;
 use keydance::models::LossTerms;
-use keydance::models::transition::{Batch, Feed, Network, Standardisation};
+use keydance::models::transition::{Batch, Forcing, Network, Standardisation};
 use keydance::motion::features::{FRAME, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array1, Array2, Array3, ArrayView2, Axis, s};
 
@@ -30,7 +30,7 @@ impl Network<f32> for Witness {
         &self,
         tape: &mut Tape<'_, f32>,
         batch: &Batch<f32>,
-        _feed: Feed,
+        _forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
         self.shown.lock().unwrap().push(batch.clone());
         let weight = tape.block(self.weight);

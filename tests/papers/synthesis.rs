@@ -145,7 +145,7 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 fn assert_at_keyframes(sequence: &Sequence, request: &SequenceRequest) {
-    let world = world(&sequence);
+    let world = world(sequence);
     for timed in &request.keyframes {
         let wanted = timed.keyframe.pose.world_positions(&request.skeleton);
         for (found, wanted) in world[timed.time].iter().zip(wanted) {

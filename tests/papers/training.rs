@@ -9,7 +9,7 @@ use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::experiment::ExperimentConfig;
 use keydance::models::LossTerms;
 use keydance::models::pan2021::{Controllers, Pan2021Config};
-use keydance::models::transition::{Batch, Feed, ModelConfig, Network, TransitionSettings};
+use keydance::models::transition::{Batch, Forcing, ModelConfig, Network, TransitionSettings};
 use keydance::models::weights::SavedWeights;
 use keydance::run::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
 use keydance::run::state::decode;
@@ -121,7 +121,7 @@ fn both_feeds_are_drawn_and_the_loss_falls() {
     assert!(feeds(|beta| beta > 0.5) > 5 && feeds(|beta| beta < 0.5) > 5);
     let predicted = reports
         .iter()
-        .filter(|r| r.column("feed").unwrap() == "predictions");
+        .filter(|r| r.column("teacher_forcing").unwrap() == false);
     assert!((5..reports.len() - 5).contains(&predicted.count()));
     let mean = |reports: &[StepReport]| {
         reports.iter().map(|r| r.total).sum::<f64>() / reports.len() as f64
@@ -414,7 +414,7 @@ impl Network<f32> for Cusp {
         &self,
         tape: &mut Tape<'_, f32>,
         _batch: &Batch<f32>,
-        _feed: Feed,
+        _forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
         let weight = tape.block(self.0);
         let square = tape.square(weight);

@@ -14,7 +14,7 @@ use crate::motion::features::{
 
 /// Where a window's frame lies in the world.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct WindowFrame {
     /// p^r of k1, cm.
     origin: DVec3,
     /// Turns the world to k1's facing.
@@ -24,17 +24,17 @@ struct Place {
 }
 
 /// The numbers of windows that a network with rotations reads, from their features and poses.
-pub(super) struct Given<'b, T> {
+pub(super) struct GivenWindows<'b, T> {
     batch: &'b Batch<T>,
     pub(super) poses: &'b PoseWindows<T>,
     standardisation: &'b Standardisation,
-    places: Vec<Place>,
+    places: Vec<WindowFrame>,
     pub(super) windows: usize,
     /// N
     pub(super) transition: usize,
 }
 
-impl<'b, T: Real> Given<'b, T> {
+impl<'b, T: Real> GivenWindows<'b, T> {
     /// # Errors
     /// Features of another shape than documented, no poses or poses of another shape.
     pub(super) fn new(
@@ -73,7 +73,7 @@ impl<'b, T: Real> Given<'b, T> {
             .map(|window| {
                 let turn = DQuat::from_rotation_y(-given.number(0, window, FACING.start));
                 let root = turn * given.quaternion(0, window, 0);
-                Place {
+                WindowFrame {
                     origin: given.vector(0, window, ROOT_POSITION.start),
                     turn,
                     sign: if root.w < 0.0 { -1.0 } else { 1.0 },
@@ -153,7 +153,7 @@ impl<'b, T: Real> Given<'b, T> {
         self.vectors(|window, place| place.turn * self.vector(0, window, ROOT_VELOCITY.start))
     }
 
-    fn vectors(&self, of: impl Fn(usize, &Place) -> DVec3) -> Vec<T> {
+    fn vectors(&self, of: impl Fn(usize, &WindowFrame) -> DVec3) -> Vec<T> {
         let places = self.places.iter().enumerate();
         places
             .flat_map(|(window, place)| of(window, place).to_array().map(T::from_f64))
@@ -178,7 +178,7 @@ impl<'b, T: Real> Given<'b, T> {
 
     /// A place in the window's frame, cm, as one in the world.
     pub(super) fn in_world(&self, window: usize, place: DVec3) -> DVec3 {
-        let Place { origin, turn, .. } = self.places[window];
+        let WindowFrame { origin, turn, .. } = self.places[window];
         origin + turn.conjugate() * place
     }
 }

@@ -2,7 +2,7 @@
 
 use super::config::Harvey2020Config;
 use super::critic::{Critic, judge};
-use super::given::Given;
+use super::given::GivenWindows;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::LossTerms;
 use crate::models::transition::pose_windows::{OFFSETS, ROTATIONS};
@@ -21,7 +21,7 @@ pub(super) struct Scales {
 
 /// Frames k1 .. k2 on the tape, in the windows' frames: `[windows, ..]` each, k1 as recorded.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Motion {
+pub(super) struct PredictedFrames {
     /// `[windows, 96]`
     pub(super) rotations: Vec<Var>,
     /// `[windows, 3]`, cm
@@ -44,8 +44,8 @@ struct Frames {
 impl Frames {
     fn new<T: Real>(
         tape: &mut Tape<'_, T>,
-        motion: &Motion,
-        given: &Given<'_, T>,
+        motion: &PredictedFrames,
+        given: &GivenWindows<'_, T>,
     ) -> Result<Self, AutogradError> {
         let rows = motion.roots.len() * given.windows;
         let mut flat = |parts: &[Var], columns: usize| {
@@ -94,7 +94,7 @@ impl Frames {
 /// `[n * windows, 72]`, cm.
 pub(super) fn joints<T: Real>(
     tape: &mut Tape<'_, T>,
-    given: &Given<'_, T>,
+    given: &GivenWindows<'_, T>,
     rotations: Var,
 ) -> Result<Var, AutogradError> {
     let offsets = tape.constant_with(&[given.windows, OFFSETS], |out| {
@@ -111,13 +111,13 @@ pub(super) fn constant<T: Real>(tape: &mut Tape<'_, T>, windows: usize, values: 
 }
 
 /// The recorded motion.
-fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &Given<'_, T>) -> Motion {
+fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &GivenWindows<'_, T>) -> PredictedFrames {
     let mut frames = |of: &dyn Fn(usize) -> Vec<T>| -> Vec<Var> {
         (0..=given.transition)
             .map(|row| constant(tape, given.windows, &of(row)))
             .collect()
     };
-    Motion {
+    PredictedFrames {
         rotations: frames(&|row| given.rotations(row)),
         roots: frames(&|row| given.roots(row)),
         contacts: frames(&|row| given.contacts(row)),
@@ -137,8 +137,8 @@ pub(super) fn terms<T: Real>(
     config: &Harvey2020Config,
     scales: Scales,
     critics: &[Critic],
-    given: &Given<'_, T>,
-    predicted: &Motion,
+    given: &GivenWindows<'_, T>,
+    predicted: &PredictedFrames,
     total_windows: usize,
 ) -> Result<LossTerms, AutogradError> {
     let recorded = recorded(tape, given);

@@ -6,14 +6,14 @@ use rand::Rng;
 
 use super::config::Harvey2020Config;
 use super::critic::Critic;
-use super::given::Given;
-use super::losses::{self, Motion, Scales, constant, joints};
+use super::given::GivenWindows;
+use super::losses::{self, PredictedFrames, Scales, constant, joints};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::generator::Condition;
 use crate::models::transition::Standardisation;
 use crate::models::transition::pose_windows::ROTATIONS;
 use crate::models::transition::posed_frames::posed_frames;
-use crate::models::transition::{Batch, Feed, Network};
+use crate::models::transition::{Batch, Forcing, Network};
 use crate::models::{LossTerms, ModelError};
 use crate::motion::JOINTS;
 use crate::motion::features::{BODY_VELOCITIES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
@@ -117,7 +117,7 @@ impl Harvey2020 {
     fn start<'n, T: Real>(
         &'n self,
         tape: &mut Tape<'_, T>,
-        given: &Given<'_, T>,
+        given: &GivenWindows<'_, T>,
     ) -> Result<Rollout<'n>, AutogradError> {
         let windows = given.windows;
         let velocity = constant(tape, windows, &given.root_velocities());
@@ -241,19 +241,19 @@ impl<T: Real> Network<T> for Harvey2020 {
         &[]
     }
 
-    fn feed(&self, _drawn: Feed) -> Feed {
-        Feed::Predictions
+    fn forcing(&self, _drawn: Forcing) -> Forcing {
+        Forcing::FreeRunning
     }
 
     fn losses(
         &self,
         tape: &mut Tape<'_, T>,
         batch: &Batch<T>,
-        _feed: Feed,
+        _forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
-        let given = Given::new(batch, &self.standardisation)?;
+        let given = GivenWindows::new(batch, &self.standardisation)?;
         let mut rollout = self.start(tape, &given)?;
-        let mut motion = Motion::default();
+        let mut motion = PredictedFrames::default();
         for t in 0..=given.transition {
             motion.rotations.push(rollout.state.rotations);
             motion.roots.push(rollout.state.root);
@@ -282,7 +282,7 @@ impl<T: Real> Network<T> for Harvey2020 {
         tape: &mut Tape<'_, T>,
         batch: &Batch<T>,
     ) -> Result<Array3<T>, AutogradError> {
-        let given = Given::new(batch, &self.standardisation)?;
+        let given = GivenWindows::new(batch, &self.standardisation)?;
         let (transition, windows) = (given.transition, given.windows);
         let mut rollout = self.start(tape, &given)?;
         let mut world = vec![Vec::with_capacity(transition); windows];

@@ -24,7 +24,7 @@ pub enum Controllers {
 pub enum Output {
     /// The frame itself, as in the paper.
     Absolute,
-    /// What is added to the best linear estimate from the keyframes, and to the given trajectory.
+    /// What is added to the prior mean, which follows the keyframes and the given trajectory.
     /// An untrained network gives just these.
     Residual,
 }
@@ -75,7 +75,7 @@ pub struct Pan2021Config {
     pub root_frame: RootFrame,
     /// What the decoders give; the paper's give the frame itself.
     pub output: Output,
-    /// A feed-forward path from the controls around each frame to what is added to its estimate;
+    /// A feed-forward path from the controls around each frame to what is added to its prior mean;
     /// not in the paper.
     pub control_path: bool,
     /// Control paths whose mean is taken: an ensemble.
@@ -188,7 +188,7 @@ impl Pan2021Config {
             !self.control_path || self.output == Output::Residual,
             "control_path",
             &self.control_path,
-            "model.output = \"residual\" with it: it corrects an estimate",
+            "model.output = \"residual\" with it: it corrects a prior mean",
         )?;
         require(
             !self.velocity_refinement || self.velocity_factor,

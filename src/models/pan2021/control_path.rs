@@ -4,8 +4,8 @@
 use rand::Rng;
 
 use super::config::Pan2021Config;
-use super::given::Given;
-use super::guess::{Estimator, estimate};
+use super::given::GivenFrames;
+use super::prior::{self, Prior};
 use super::units::{NORM_EPS, Units};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::transition::Batch;
@@ -20,15 +20,15 @@ const TURN_SCALE: f64 = 30.0;
 /// What is dropped of the last hidden layer while single frames are trained.
 const DROPOUT: f64 = 0.2;
 
-/// Corrections of the estimate of p^b from the given trajectory, the velocity factors and the
+/// Corrections of the prior mean of p^b from the given trajectory, the velocity factors and the
 /// keyframes, without memory: an [`Mlp`] of two hidden layers.
 ///
 /// What it sees of frame t: the mean velocity of p^r from it to each of the [`OFFSETS`] but 0,
 /// turned to the direction that is between the keyframes' o^r there, x and z, in deviations of v^r;
 /// the height of the root and, where the network has them, the five velocity factors at each,
-/// standardised; the turn from k1 to k2, rad a frame times 30; the estimate, p^b of k1 and of k2,
-/// these two times their likeness to frame t. All that twice, the second time multiplied with what
-/// the estimate leaves open in frame t, as the correction is itself.
+/// standardised; the turn from k1 to k2, rad a frame times 30; the mean, p^b of k1 and of k2, these
+/// two times their correlation with frame t. All that twice, the second time multiplied with the
+/// residual deviation of frame t, as the correction is itself.
 ///
 /// With more than one member it is an ensemble: the correction is the mean of its members', which
 /// differ in their initial weights and in what dropout takes from them.
@@ -64,20 +64,20 @@ impl Member {
 struct Seen {
     /// `[rows, 2 * seen]`
     input: Var,
-    /// What the estimate leaves open, `[rows, 1]`.
-    open: Var,
+    /// The residual deviation, `[rows, 1]`.
+    residual_deviation: Var,
 }
 
 /// Frame k1 + `t` of a window of a batch.
 #[derive(Clone, Copy)]
-struct Place<'f, T> {
-    given: Given<'f, T>,
-    estimator: Estimator,
+struct SeenFrame<'f, T> {
+    given: GivenFrames<'f, T>,
+    prior: Prior,
     t: usize,
     window: usize,
 }
 
-impl<'f, T: Real> Place<'f, T> {
+impl<'f, T: Real> SeenFrame<'f, T> {
     /// Frame k1 + `t` of the same window, 154 numbers.
     fn row(&self, t: usize) -> &'f [T] {
         self.given.row(t, self.window)
@@ -88,11 +88,11 @@ impl<'f, T: Real> Place<'f, T> {
         [0, self.given.transition].map(|t| self.row(t))
     }
 
-    /// The estimate of p^b.
-    fn estimate(&self, units: &Units) -> [T; BODY_POSITIONS.end] {
+    /// The prior mean of p^b.
+    fn prior_mean(&self, units: &Units) -> [T; BODY_POSITIONS.end] {
         let [first, last] = self.keyframes();
-        let weights = self.estimator.weights(self.t).map(T::from_f64);
-        std::array::from_fn(|number| estimate(weights, units.ends(number, first, last)))
+        let weights = self.prior.weights(self.t).map(T::from_f64);
+        std::array::from_fn(|number| prior::mean(weights, units.ends(number, first, last)))
     }
 }
 
@@ -118,25 +118,25 @@ impl ControlPath {
         &self,
         tape: &mut Tape<'_, T>,
         units: &Units,
-        estimator: Estimator,
-        given: Given<'_, T>,
+        prior: Prior,
+        given: GivenFrames<'_, T>,
     ) -> Result<Var, AutogradError> {
-        let places: Vec<_> = (1..=given.transition)
+        let frames: Vec<_> = (1..=given.transition)
             .flat_map(|t| {
-                (0..given.windows).map(move |window| Place {
+                (0..given.windows).map(move |window| SeenFrame {
                     given,
-                    estimator,
+                    prior,
                     t,
                     window,
                 })
             })
             .collect();
-        let seen = self.seen(tape, units, &places);
+        let seen = self.seen(tape, units, &frames);
         let corrections = self.mean_of_members(tape, |tape, member| {
             let hidden = member.hidden.forward(tape, seen.input)?;
             member.last.forward(tape, hidden)
         })?;
-        tape.mul(corrections, seen.open)
+        tape.mul(corrections, seen.residual_deviation)
     }
 
     /// The distance of p^b with a member's corrections from the true one, in s_p, the mean over the
@@ -151,11 +151,11 @@ impl ControlPath {
         units: &Units,
         batch: &Batch<T>,
     ) -> Result<Var, AutogradError> {
-        let places = batch
+        let frames = batch
             .single_frames
             .iter()
             .map(|frame| {
-                let given = Given::new(&frame.window)?;
+                let given = GivenFrames::new(&frame.window)?;
                 if !(1..=given.transition).contains(&frame.frame) {
                     return Err(AutogradError::Argument {
                         operation: "pan2021",
@@ -164,31 +164,30 @@ impl ControlPath {
                         expected: "1 to N",
                     });
                 }
-                Ok(Place {
+                Ok(SeenFrame {
                     given,
-                    estimator: Estimator::new(given.transition),
+                    prior: Prior::new(given.transition),
                     t: frame.frame,
                     window: 0,
                 })
             })
             .collect::<Result<Vec<_>, AutogradError>>()?;
         let numbers = BODY_POSITIONS.len();
-        let missed = tape.constant_with(&[places.len(), numbers], |out| {
-            for (out, place) in out.chunks_exact_mut(numbers).zip(&places) {
-                let truth = &place.row(place.t)[BODY_POSITIONS];
-                for ((out, &truth), estimate) in
-                    out.iter_mut().zip(truth).zip(place.estimate(units))
+        let missed = tape.constant_with(&[frames.len(), numbers], |out| {
+            for (out, frame) in out.chunks_exact_mut(numbers).zip(&frames) {
+                let truth = &frame.row(frame.t)[BODY_POSITIONS];
+                for ((out, &truth), mean) in out.iter_mut().zip(truth).zip(frame.prior_mean(units))
                 {
-                    *out = truth - estimate;
+                    *out = truth - mean;
                 }
             }
         });
-        let seen = self.seen(tape, units, &places);
+        let seen = self.seen(tape, units, &frames);
         let sum = self.mean_of_members(tape, |tape, member| {
             let hidden = member.hidden.forward(tape, seen.input)?;
             let hidden = tape.dropout(hidden, DROPOUT);
             let corrections = member.last.forward(tape, hidden)?;
-            let corrections = tape.mul(corrections, seen.open)?;
+            let corrections = tape.mul(corrections, seen.residual_deviation)?;
             let error = tape.sub(missed, corrections)?;
             let error = units.in_scale(tape, error)?;
             let distances = tape.vector_norm(error, NORM_EPS)?;
@@ -215,36 +214,39 @@ impl ControlPath {
         &self,
         tape: &mut Tape<'_, T>,
         units: &Units,
-        places: &[Place<'_, T>],
+        frames: &[SeenFrame<'_, T>],
     ) -> Seen {
         let half = seen(self.velocity_factor);
-        let open: Vec<T> = places
+        let deviations: Vec<T> = frames
             .iter()
-            .map(|place| T::from_f64(place.estimator.deviation(place.t)))
+            .map(|frame| T::from_f64(frame.prior.deviation(frame.t)))
             .collect();
-        let input = tape.constant_with(&[places.len(), 2 * half], |out| {
+        let input = tape.constant_with(&[frames.len(), 2 * half], |out| {
             let mut seen = Vec::with_capacity(half);
-            for ((out, place), &open) in out.chunks_exact_mut(2 * half).zip(places).zip(&open) {
+            for ((out, frame), &deviation) in
+                out.chunks_exact_mut(2 * half).zip(frames).zip(&deviations)
+            {
                 seen.clear();
-                self.see(units, place, &mut seen);
-                let (plain, opened) = out.split_at_mut(half);
+                self.see(units, frame, &mut seen);
+                let (plain, scaled) = out.split_at_mut(half);
                 plain.copy_from_slice(&seen);
-                for (opened, &plain) in opened.iter_mut().zip(&seen) {
-                    *opened = open * plain;
+                for (scaled, &plain) in scaled.iter_mut().zip(&seen) {
+                    *scaled = deviation * plain;
                 }
             }
         });
         Seen {
             input,
-            open: tape.constant_with(&[places.len(), 1], |out| out.copy_from_slice(&open)),
+            residual_deviation: tape
+                .constant_with(&[frames.len(), 1], |out| out.copy_from_slice(&deviations)),
         }
     }
 
     /// Appends what is seen of a frame.
-    fn see<T: Real>(&self, units: &Units, place: &Place<'_, T>, seen: &mut Vec<T>) {
-        let (t, n) = (place.t, place.given.transition);
-        let ([first, last], now) = (place.keyframes(), place.row(t));
-        let near = |offset: isize| place.row(t.saturating_add_signed(offset).min(n));
+    fn see<T: Real>(&self, units: &Units, frame: &SeenFrame<'_, T>, seen: &mut Vec<T>) {
+        let (t, n) = (frame.t, frame.given.transition);
+        let ([first, last], now) = (frame.keyframes(), frame.row(t));
+        let near = |offset: isize| frame.row(t.saturating_add_signed(offset).min(n));
         let turn = (last[FACING.start] - first[FACING.start]) / T::from_f64(n as f64);
         let facing = units.facing(first[FACING.start] + turn * T::from_f64(t as f64));
         let (sin, cos) = facing.sin_cos();
@@ -264,8 +266,8 @@ impl ControlPath {
             }
         }
         seen.push(turn * T::from_f64(units.facing_std * TURN_SCALE));
-        seen.extend(place.estimate(units));
-        let [to_first, to_last] = place.estimator.likenesses(t).map(T::from_f64);
+        seen.extend(frame.prior_mean(units));
+        let [to_first, to_last] = frame.prior.correlations(t).map(T::from_f64);
         seen.extend(first[BODY_POSITIONS].iter().map(|&x| to_first * x));
         seen.extend(last[BODY_POSITIONS].iter().map(|&x| to_last * x));
     }

@@ -10,14 +10,14 @@ use crate::motion::features::FEATURES;
 
 /// Standardised features of windows, `[N + 1, windows, 154]`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Given<'f, T> {
+pub(super) struct GivenFrames<'f, T> {
     values: &'f [T],
     pub windows: usize,
     /// N
     pub transition: usize,
 }
 
-impl<'f, T: Real> Given<'f, T> {
+impl<'f, T: Real> GivenFrames<'f, T> {
     /// # Errors
     /// Features of another shape, without a frame after k1, or not in standard layout.
     pub fn new(features: &'f Array3<T>) -> Result<Self, AutogradError> {

@@ -5,7 +5,7 @@
 //! - `control_path`: a feed-forward path from the controls, an option;
 //! - `network`: encoders, LSTM backbone and decoders (figure 2), one frame after the other;
 //! - `given`: a batch as the network is given it;
-//! - `guess`: what a residual network's numbers are added to;
+//! - `prior`: the mean that a residual network's numbers are added to;
 //! - `losses`: eq. 3 to 11;
 //! - `units`: from standardised numbers to centimetres on the tape.
 //!
@@ -15,9 +15,9 @@ mod config;
 mod control_path;
 mod controller;
 mod given;
-mod guess;
 mod losses;
 mod network;
+mod prior;
 mod units;
 
 pub use config::{Controllers, LossWeights, Output, Pan2021Config};

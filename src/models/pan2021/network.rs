@@ -7,14 +7,14 @@ use super::TRANSFORMERS;
 use super::config::{Controllers, Output, Pan2021Config};
 use super::control_path::ControlPath;
 use super::controller::{Controller, Session, Trajectory};
-use super::given::Given;
-use super::guess::{self, Estimator};
+use super::given::GivenFrames;
 use super::losses;
+use super::prior::{self, Prior};
 use super::units::{Units, VELOCITIES};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::generator::Condition;
 use crate::models::transition::Standardisation;
-use crate::models::transition::{Batch, Feed, Network};
+use crate::models::transition::{Batch, Forcing, Network};
 use crate::models::{LossTerms, ModelError};
 use crate::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
@@ -104,7 +104,7 @@ impl Pan2021 {
                 Lstm::new(init, "lstm2", last_input, code),
             ),
         };
-        // A residual network begins as the estimate that it adds to.
+        // A residual network begins as the mean that it adds to.
         let last = match config.output {
             Output::Absolute => LastLayer::Linear,
             Output::Residual => LastLayer::Zero,
@@ -140,7 +140,7 @@ impl Pan2021 {
         tape: &mut Tape<'_, T>,
         features: &'f Array3<T>,
     ) -> Result<Rollout<'n, 'f, T>, AutogradError> {
-        let given = Given::new(features)?;
+        let given = GivenFrames::new(features)?;
         let (transition, windows) = (given.transition, given.windows);
         let trajectory = |columns: std::ops::Range<usize>| Trajectory {
             values: given.all(columns),
@@ -162,15 +162,15 @@ impl Pan2021 {
                 vec![first.start(tape, windows), second.start(tape, windows)]
             }
         };
-        let estimator = Estimator::new(transition);
+        let prior = Prior::new(transition);
         let corrections = match &self.control_path {
-            Some(path) => Some(path.corrections(tape, &self.units, estimator, given)?),
+            Some(path) => Some(path.corrections(tape, &self.units, prior, given)?),
             None => None,
         };
         Ok(Rollout {
             network: self,
             given,
-            estimator,
+            prior,
             corrections,
             target_code,
             states,
@@ -184,8 +184,8 @@ impl Pan2021 {
 /// The network at work on the windows of one batch.
 struct Rollout<'n, 'f, T> {
     network: &'n Pan2021,
-    given: Given<'f, T>,
-    estimator: Estimator,
+    given: GivenFrames<'f, T>,
+    prior: Prior,
     /// Of p^b, `[N * windows, 69]`, where the network has a control path.
     corrections: Option<Var>,
     target_code: Var,
@@ -292,10 +292,10 @@ impl<T: Real> Rollout<'_, '_, T> {
         match network.config.output {
             Output::Absolute => Ok(decoded),
             Output::Residual => {
-                let open = self.open(tape, t);
-                let scaled = tape.mul(decoded, open)?;
-                let guess = self.guess(tape, t);
-                let frame = tape.add(scaled, guess)?;
+                let deviation = self.residual_deviation(tape, t);
+                let scaled = tape.mul(decoded, deviation)?;
+                let mean = self.prior_mean(tape, t);
+                let frame = tape.add(scaled, mean)?;
                 match self.corrections {
                     Some(corrections) => self.corrected(tape, t, frame, corrections),
                     None => Ok(frame),
@@ -349,22 +349,22 @@ impl<T: Real> Rollout<'_, '_, T> {
         tape.concat(&parts)
     }
 
-    /// What a residual is multiplied with in frame t + 1, `[149]`: what the estimate of p^b leaves
-    /// open, of p^r and o^r the same share; of the velocities what that of v^b does; 1 for c.
-    fn open(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
+    /// What a residual is multiplied with in frame t + 1, `[149]`: the deviation of the prior of p^b,
+    /// of p^r and o^r the same; of the velocities that of v^b; 1 for c.
+    fn residual_deviation(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         tape.constant_with(&[FRAME], |out| {
-            out.fill(T::from_f64(self.estimator.deviation(t + 1)));
+            out.fill(T::from_f64(self.prior.deviation(t + 1)));
             out[CONTACTS].fill(T::one());
-            out[VELOCITIES].fill(T::from_f64(self.estimator.step_deviation(t + 1)));
+            out[VELOCITIES].fill(T::from_f64(self.prior.step_deviation(t + 1)));
         })
     }
 
     /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as
-    /// [`Estimator`] has it, p^r of the given trajectory, o^r linearly between the keyframes; v^b
+    /// [`Prior`] has it, p^r of the given trajectory, o^r linearly between the keyframes; v^b
     /// and v^r the differences of these p^b and p^r; c 0, their means.
-    fn guess(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
+    fn prior_mean(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         let (units, n) = (&self.network.units, self.given.transition);
-        let weights = [t, t + 1].map(|t| self.estimator.weights(t).map(T::from_f64));
+        let weights = [t, t + 1].map(|t| self.prior.weights(t).map(T::from_f64));
         let share = T::from_f64((t + 1) as f64 / n as f64);
         let ends = self.given.frame(0).zip(self.given.frame(n));
         let given = self.given.frame(t).zip(self.given.frame(t + 1));
@@ -377,7 +377,7 @@ impl<T: Real> Rollout<'_, '_, T> {
                     let [earlier, place] = match BODY_POSITIONS.contains(&column) {
                         true => {
                             let ends = units.ends(column, first, last);
-                            weights.map(|weights| guess::estimate(weights, ends))
+                            weights.map(|weights| prior::mean(weights, ends))
                         }
                         false => [before[column], now[column]],
                     };
@@ -442,7 +442,7 @@ impl<T: Real> Network<T> for Pan2021 {
         &self,
         tape: &mut Tape<'_, T>,
         batch: &Batch<T>,
-        feed: Feed,
+        forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
         let mut rollout = self.start(tape, &batch.features)?;
         let first = rollout.given.constant(tape, 0, 0..FRAME);
@@ -451,9 +451,9 @@ impl<T: Real> Network<T> for Pan2021 {
         for t in 0..rollout.given.transition {
             let frame = rollout.step(tape, t)?;
             frames.push(frame);
-            match feed {
-                Feed::GroundTruth => rollout.feed_truth(tape, t + 1),
-                Feed::Predictions => rollout.feed_prediction(tape, t + 1, frame)?,
+            match forcing {
+                Forcing::Teacher => rollout.feed_truth(tape, t + 1),
+                Forcing::FreeRunning => rollout.feed_prediction(tape, t + 1, frame)?,
             }
         }
         let single_frames = match &self.control_path {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use safetensors::tensor::{Dtype, TensorView};
 
 use super::training_windows::{features_of, poses_of};
-use super::{Batch, DanceClip, Feed, RootFrame, Standardisation, TrainedModel, Window, windows};
+use super::{Batch, DanceClip, Forcing, RootFrame, Standardisation, TrainedModel, Window, windows};
 use crate::autograd::{AutogradError, Gradients, Tape, Workspace};
 use crate::models::ModelError;
 
@@ -15,7 +15,7 @@ pub struct ExportedBatch {
     /// N, frames of a transition.
     pub frames: usize,
     pub windows: usize,
-    pub feed: Feed,
+    pub forcing: Forcing,
 }
 
 /// Why there is no batch.
@@ -49,10 +49,10 @@ pub fn export_batch(
     let batch = cut(asked, clips, model.standardisation(), root_frame)?;
     let mut workspace = Workspace::new();
     let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &batch)?;
-    let feed = network.feed(asked.feed);
+    let forcing = network.forcing(asked.forcing);
     let mut gradients = Gradients::zeros(parameters);
     let mut tape = Tape::recording(parameters, &mut workspace);
-    let losses = network.losses(&mut tape, &batch, feed)?;
+    let losses = network.losses(&mut tape, &batch, forcing)?;
     let mut entries: BTreeMap<String, Entry> = BTreeMap::new();
     for (name, term) in losses.terms.iter().chain([&("total", losses.total)]) {
         entries.insert(
@@ -69,7 +69,7 @@ pub fn export_batch(
         let entry = (array.shape().to_vec(), array.into_raw_vec_and_offset().0);
         entries.insert(name.into(), entry);
     }
-    let fed = f32::from(u8::from(feed == Feed::GroundTruth));
+    let fed = f32::from(u8::from(forcing == Forcing::Teacher));
     entries.insert("ground_truth_fed".into(), (vec![1], vec![fed]));
     Ok(serialise(&entries)?)
 }

@@ -8,7 +8,9 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::training_windows::{features_of, poses_of};
-use super::{Batch, DanceClip, Feed, ModelConfig, RootFrame, SingleFrame, Standardisation, Window};
+use super::{
+    Batch, DanceClip, Forcing, ModelConfig, RootFrame, SingleFrame, Standardisation, Window,
+};
 use crate::autograd::check::{CheckReport, check_parameters};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
@@ -31,7 +33,7 @@ const DROPOUT_KEY: u64 = 0x5eed;
 pub struct GradientCase {
     /// N, frames from k1 to k2.
     pub transition: usize,
-    pub feed: Feed,
+    pub forcing: Forcing,
     /// Whether dropout acts, with the same masks at every evaluation.
     pub dropout: bool,
 }
@@ -57,11 +59,11 @@ impl GradientCase {
         let transitions = frames.map_or(TRANSITIONS.to_vec(), |frames| vec![frames]);
         let mut cases = Vec::new();
         for transition in transitions {
-            for feed in [Feed::Predictions, Feed::GroundTruth] {
+            for forcing in [Forcing::FreeRunning, Forcing::Teacher] {
                 for dropout in [false, true] {
                     cases.push(Self {
                         transition,
-                        feed,
+                        forcing,
                         dropout,
                     });
                 }
@@ -71,12 +73,12 @@ impl GradientCase {
     }
 
     fn title(&self) -> String {
-        let feed = match self.feed {
-            Feed::GroundTruth => "the truth fed",
-            Feed::Predictions => "own predictions fed",
+        let forcing = match self.forcing {
+            Forcing::Teacher => "the truth fed",
+            Forcing::FreeRunning => "own predictions fed",
         };
         let dropout = if self.dropout { "on" } else { "off" };
-        format!("N = {}, {feed}, dropout {dropout}", self.transition)
+        format!("N = {}, {forcing}, dropout {dropout}", self.transition)
     }
 }
 
@@ -160,7 +162,7 @@ pub fn check_model(
         &mut Initialiser::new(&mut parameters, &mut rng),
         &standardisation,
     )?;
-    if network.feed(case.feed) != case.feed {
+    if network.forcing(case.forcing) != case.forcing {
         return Ok(None);
     }
     for (_, value) in parameters.values_mut() {
@@ -171,7 +173,7 @@ pub fn check_model(
     let mut gradients = Gradients::zeros(&parameters);
     let mut tape = Tape::recording(&parameters, &mut workspace);
     tape.set_dropout(key);
-    let total = network.losses(&mut tape, &batch, case.feed)?.total;
+    let total = network.losses(&mut tape, &batch, case.forcing)?.total;
     tape.check_finite()?;
     tape.backward(total, &mut gradients)?;
     let report = check_parameters(
@@ -181,7 +183,7 @@ pub fn check_model(
         |parameters, name| {
             let mut tape = Tape::inference(parameters, &mut workspace);
             tape.set_dropout(key);
-            let losses = network.losses(&mut tape, &batch, case.feed)?;
+            let losses = network.losses(&mut tape, &batch, case.forcing)?;
             let total = tape.values(losses.total)[0];
             let critics = losses
                 .critics

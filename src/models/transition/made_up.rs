@@ -10,7 +10,7 @@ use super::settings::TransitionSettings;
 use super::single_frames;
 use super::task::{StepPlan, TransitionStep};
 use super::training_windows::TrainingWindows;
-use super::{DanceClip, Feed, Network, RootFrame, Standardisation, Window};
+use super::{DanceClip, Forcing, Network, RootFrame, Standardisation, Window};
 use crate::autograd::Parameters;
 use crate::models::settings::InitialRng;
 use crate::models::{Generator, ModelError, Statistics, Step, Streams, Task};
@@ -97,7 +97,7 @@ impl Task<f32> for MadeUpTask {
             windows: &self.windows,
             shards: self.shards,
             plan: self.plan.clone(),
-            feed: Feed::Predictions,
+            forcing: Forcing::FreeRunning,
             epoch: 0,
             beta: 0.0,
         })

@@ -38,7 +38,7 @@ mod windows;
 
 pub use dance_clip::DanceClip;
 pub use kind::{Kind, ModelConfig, NoSettings};
-pub use network::{Batch, Feed, Network, SingleFrame};
+pub use network::{Batch, Forcing, Network, SingleFrame};
 pub use pose_windows::PoseWindows;
 pub use ranges::DataRanges;
 pub use request::{KeyframePose, Transition, TransitionModel, TransitionRequest, check_frames};

@@ -46,21 +46,11 @@ impl<T: Real> Batch<T> {
 
 /// What is fed to the network as the current frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Feed {
-    /// The true frames (teacher forcing).
-    GroundTruth,
+pub enum Forcing {
+    /// The true frames.
+    Teacher,
     /// The network's own predictions, the gradient flowing back through them.
-    Predictions,
-}
-
-impl Feed {
-    /// Its name in the log.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::GroundTruth => "ground_truth",
-            Self::Predictions => "predictions",
-        }
-    }
+    FreeRunning,
 }
 
 /// A trainable network; its weights live in the [`crate::autograd::Parameters`] that it was built
@@ -88,7 +78,7 @@ pub trait Network<T: Real>: Send + Sync {
     }
 
     /// What it is fed at a step for which scheduled sampling drew `drawn`.
-    fn feed(&self, drawn: Feed) -> Feed {
+    fn forcing(&self, drawn: Forcing) -> Forcing {
         drawn
     }
 
@@ -101,7 +91,7 @@ pub trait Network<T: Real>: Send + Sync {
         &self,
         tape: &mut Tape<'_, T>,
         batch: &Batch<T>,
-        feed: Feed,
+        forcing: Forcing,
     ) -> Result<LossTerms, AutogradError>;
 
     /// Predicts frames k1 + 1 .. k2 from row 0 (all of it), row N (keyframe) and, of the other

@@ -12,7 +12,7 @@ use super::settings::{ScheduledSamplingConfig, TransitionSettings};
 use super::single_frames::{self, SingleFramePlan};
 use super::training_windows::{TrainingWindows, poses_of};
 use super::{
-    Batch, BatchPlan, DanceClip, DataRanges, Feed, Network, Schedule, Standardisation, Window,
+    Batch, BatchPlan, DanceClip, DataRanges, Forcing, Network, Schedule, Standardisation, Window,
 };
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::models::settings::TaskSetting;
@@ -135,15 +135,15 @@ impl Task<f32> for TransitionTask {
             .teacher_forcing(&self.scheduled_sampling, step);
         let mut sampling = self.streams.stream("sampling", &[step]);
         let drawn = match sampling.random::<f64>() < beta {
-            true => Feed::GroundTruth,
-            false => Feed::Predictions,
+            true => Forcing::Teacher,
+            false => Forcing::FreeRunning,
         };
         Box::new(TransitionStep {
             network: &*self.network,
             windows: &self.windows,
             shards: self.shards,
             plan,
-            feed: self.network.feed(drawn),
+            forcing: self.network.forcing(drawn),
             epoch,
             beta,
         })
@@ -205,7 +205,7 @@ pub(super) struct TransitionStep<'t> {
     pub windows: &'t TrainingWindows,
     pub shards: usize,
     pub plan: StepPlan,
-    pub feed: Feed,
+    pub forcing: Forcing,
     pub epoch: usize,
     /// Probability of the ground truth at this step.
     pub beta: f64,
@@ -238,7 +238,7 @@ impl Step<f32> for TransitionStep<'_> {
                 .single_frames(&single_frames[of_shard(single_frames.len())]),
             total_single_frames: single_frames.len(),
         };
-        self.network.losses(tape, &batch, self.feed)
+        self.network.losses(tape, &batch, self.forcing)
     }
 
     fn columns(&self) -> Vec<(&'static str, Value)> {
@@ -246,7 +246,7 @@ impl Step<f32> for TransitionStep<'_> {
             ("epoch", json!(self.epoch)),
             ("length", json!(self.plan.length)),
             ("batch", json!(self.plan.windows.len())),
-            ("feed", json!(self.feed.name())),
+            ("teacher_forcing", json!(self.forcing == Forcing::Teacher)),
             ("beta", json!(self.beta)),
         ]
     }

@@ -20,11 +20,11 @@ const CHUNK: usize = 8;
 /// Transitions of test clips, one a clip: the first is shown, all are measured.
 pub struct Stage<'d> {
     /// At least one.
-    windows: Vec<Window<'d>>,
+    windows: Vec<ShownWindow<'d>>,
 }
 
 /// One transition of a clip.
-pub struct Window<'d> {
+pub struct ShownWindow<'d> {
     pub clip: &'d DanceClip,
     pub start: usize,
     /// `[N + 1, 154]`, not standardised.
@@ -92,7 +92,7 @@ impl<'d> Stage<'d> {
                     clip.frames()
                 )));
             }
-            windows.push(Window {
+            windows.push(ShownWindow {
                 clip,
                 start,
                 recorded: window_features(&clip.features, start, length),
@@ -103,12 +103,12 @@ impl<'d> Stage<'d> {
     }
 
     /// The window that the figures show.
-    pub fn shown(&self) -> &Window<'d> {
+    pub fn shown(&self) -> &ShownWindow<'d> {
         &self.windows[0]
     }
 
     /// All windows, the shown one first.
-    pub fn windows(&self) -> &[Window<'d>] {
+    pub fn windows(&self) -> &[ShownWindow<'d>] {
         &self.windows
     }
 
@@ -163,7 +163,7 @@ impl<'d> Stage<'d> {
     }
 }
 
-impl Window<'_> {
+impl ShownWindow<'_> {
     /// "NAME, frames 120 to 220 (N = 100)".
     pub fn describe(&self) -> String {
         let length = self.recorded.nrows() - 1;
