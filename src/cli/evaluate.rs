@@ -72,7 +72,12 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         subject.what, data.clips, data.part, data.frames
     )?;
     let config = &subject.config;
-    let protocol = config.model.protocol(&config.data, &args.options());
+    let lengths = BTreeSet::from_iter(args.lengths.iter().map(|&length| length.into()));
+    let options = EvaluationOptions {
+        lengths: lengths.into_iter().collect(),
+        most_windows: None,
+    };
+    let protocol = config.model.protocol(&config.data, &options);
     let pool = args.threads.pool()?;
     let evaluation =
         pool.install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
@@ -104,14 +109,4 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         record.write(folder)?;
     }
     Ok(())
-}
-
-impl EvaluateArgs {
-    fn options(&self) -> EvaluationOptions {
-        let lengths = BTreeSet::from_iter(self.lengths.iter().map(|&length| length.into()));
-        EvaluationOptions {
-            lengths: lengths.into_iter().collect(),
-            most_windows: None,
-        }
-    }
 }

@@ -126,8 +126,13 @@ impl Tables<'_> {
         let compared = |ours: &[Option<f64>], of: &TableRow| {
             let row = of.scores.as_ref().and_then(|scores| scores.row(metric.key));
             let same = row.is_some_and(|row| row.columns().eq(&self.printed.columns));
-            let paper = paper.as_ref()?;
-            Some(cells(&difference(ours, paper, columns, same), true))
+            // A mean is compared only if it is over the same columns.
+            let values = ours.iter().zip(paper.as_ref()?).zip(columns);
+            let differences = values.map(|((ours, paper), column)| {
+                let compared = same || column != AVERAGE;
+                Some((*ours)? - paper.filter(|_| compared)?)
+            });
+            Some(cells(&differences.collect::<Vec<_>>(), true))
         };
         let absent = || vec![ABSENT.to_string(); columns.len()];
         let by_seed = group.differ_in_seed_only();
@@ -362,22 +367,6 @@ impl Group<'_> {
 fn our_values(row: Option<&ScoreRow>, columns: &[String]) -> Vec<Option<f64>> {
     let value = |column: &String| row.and_then(|row| row.at(column));
     columns.iter().map(value).collect()
-}
-
-/// Ours minus the paper's; a mean only if it is over the same columns.
-fn difference(
-    ours: &[Option<f64>],
-    paper: &[Option<f64>],
-    columns: &[String],
-    same_columns: bool,
-) -> Vec<Option<f64>> {
-    let pairs = ours.iter().zip(paper).zip(columns);
-    pairs
-        .map(|((ours, paper), column)| {
-            let compared = same_columns || column != AVERAGE;
-            ours.filter(|_| compared).zip(*paper).map(|(a, b)| a - b)
-        })
-        .collect()
 }
 
 fn cells(values: &[Option<f64>], signed: bool) -> Vec<String> {
