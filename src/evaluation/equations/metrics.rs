@@ -12,7 +12,7 @@ use crate::motion::placement::world_positions;
 use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
 /// How far one predicted window is from the recorded one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WindowScores {
     /// The window's term of eq. 12: mean over frames of `||p~^b - p^b||_2`, the norm of the
     /// 69-number difference, cm.
@@ -64,21 +64,13 @@ pub fn window_scores(
     let length = rows - 1;
     check_frames(predicted, length)?;
 
-    let mut sums = WindowScores {
-        body_position: 0.0,
-        velocity_factor: 0.0,
-        root: 0.0,
-        foot_travel: 0.0,
-        foot_contacts: 0,
-    };
+    let mut sums = WindowScores::default();
     let mut before_world = world_positions(recorded.row(0));
     let mut before = recorded.row(0);
     for (truth, frame) in recorded.rows().into_iter().skip(1).zip(predicted.rows()) {
         let distance = |range: Range<usize>| {
-            range
-                .map(|column| (frame[column] - truth[column]).powi(2))
-                .sum::<f64>()
-                .sqrt()
+            let squares = range.map(|column| (frame[column] - truth[column]).powi(2));
+            squares.sum::<f64>().sqrt()
         };
         let factor_error: f64 = velocity_factors_between(before, frame)
             .iter()
@@ -125,12 +117,9 @@ pub fn means(windows: &[WindowScores], delta_v: f64, delta_r: f64) -> [f64; 3] {
     let share = |hit: &dyn Fn(&WindowScores) -> bool| {
         windows.iter().filter(|window| hit(window)).count() as f64 / count
     };
+    let distances = windows.iter().map(|window| window.body_position);
     [
-        windows
-            .iter()
-            .map(|window| window.body_position)
-            .sum::<f64>()
-            / count,
+        distances.sum::<f64>() / count,
         share(&|window| window.velocity_factor < delta_v),
         share(&|window| window.root < delta_r),
     ]
