@@ -84,18 +84,16 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     for warning in &evaluation.warnings {
         notice(format_args!("warning: {warning}"));
     }
+    let scores = evaluation.scores;
     let row = TableRow {
         name: config.name.clone(),
         seed: None,
-        scores: Some(evaluation.scores.clone()),
+        scores: Some(scores.clone()),
         schedule_note: String::new(),
     };
     let (metrics, printed) = (protocol.metrics(), &config.printed()?);
     write!(out, "{}", Tables { metrics, printed }.terminal(&[row]))?;
-    let record = EvaluationRecord {
-        scores: evaluation.scores,
-        data,
-    };
+    let record = EvaluationRecord { scores, data };
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }

@@ -119,15 +119,14 @@ impl ExperimentConfig {
         flatten("", &Value::Table(self.to_table()?), &mut ours);
         flatten("", &Value::Table(other.to_table()?), &mut theirs);
         let keys: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
-        let differing = keys
+        let value =
+            |side: &BTreeMap<_, String>, key| side.get(key).map_or("none".into(), String::clone);
+        let values = keys
             .into_iter()
-            .map(|key| (key, [&ours, &theirs].map(|side| side.get(key))))
-            .filter(|(_, [ours, theirs])| ours != theirs);
+            .map(|key| (key, value(&ours, key), value(&theirs, key)));
+        let differing = values.filter(|(_, ours, theirs)| ours != theirs);
         Ok(differing
-            .map(|(key, sides)| {
-                let [ours, theirs] = sides.map(|side| side.map_or("none", String::as_str));
-                format!("{key}: {ours}, {theirs}")
-            })
+            .map(|(key, ours, theirs)| format!("{key}: {ours}, {theirs}"))
             .collect())
     }
 

@@ -198,13 +198,10 @@ fn run_shard(
     }
     let losses = input.step.losses(&mut tape, shard)?;
     let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
+    let terms = losses.terms.iter();
     let values = Losses {
         total: number(losses.total),
-        terms: losses
-            .terms
-            .iter()
-            .map(|&(name, var)| (name, number(var)))
-            .collect(),
+        terms: terms.map(|&(name, var)| (name, number(var))).collect(),
         buffers: losses.buffers,
     };
     if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {

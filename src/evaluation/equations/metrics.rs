@@ -72,13 +72,14 @@ pub fn window_scores(
             let squares = range.map(|column| (frame[column] - truth[column]).powi(2));
             squares.sum::<f64>().sqrt()
         };
-        let factor_error: f64 = velocity_factors_between(before, frame)
+        let factors = velocity_factors_between(before, frame);
+        let wanted = truth.slice(s![VELOCITY_FACTORS]);
+        let errors = factors
             .iter()
-            .zip(truth.slice(s![VELOCITY_FACTORS]))
-            .map(|(predicted, wanted)| (predicted - wanted).abs())
-            .sum();
+            .zip(wanted)
+            .map(|(x, wanted)| (x - wanted).abs());
         sums.body_position += distance(BODY_POSITIONS);
-        sums.velocity_factor += factor_error / PARTS as f64;
+        sums.velocity_factor += errors.sum::<f64>() / PARTS as f64;
         sums.root += distance(ROOT_POSITION);
         let world = world_positions(frame);
         for (joint, on) in FOOT_JOINTS.into_iter().zip(in_contact(truth)) {

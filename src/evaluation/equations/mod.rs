@@ -224,10 +224,8 @@ fn measure_chunk(
     chunk: &[Window],
     length: usize,
 ) -> Result<Vec<WindowScores>, EvaluationError> {
-    let recorded: Vec<_> = chunk
-        .iter()
-        .map(|window| window_features(&clips[window.clip].features, window.start, length))
-        .collect();
+    let features = |it: &Window| window_features(&clips[it.clip].features, it.start, length);
+    let recorded: Vec<_> = chunk.iter().map(features).collect();
     let windows = || chunk.iter().zip(&recorded);
     let requests: Vec<_> = windows()
         .map(|(window, features)| {
