@@ -72,25 +72,28 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         subject.what, data.clips, data.part, data.frames
     )?;
     let config = &subject.config;
-    let protocol = config.model.protocol(&config.data, &args.options());
+    let lengths = BTreeSet::from_iter(args.lengths.iter().map(|&length| length.into()));
+    let options = EvaluationOptions {
+        lengths: lengths.into_iter().collect(),
+        most_windows: None,
+    };
+    let protocol = config.model.protocol(&config.data, &options);
     let pool = args.threads.pool()?;
     let evaluation =
         pool.install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
     for warning in &evaluation.warnings {
         notice(format_args!("warning: {warning}"));
     }
+    let scores = evaluation.scores;
     let row = TableRow {
         name: config.name.clone(),
         seed: None,
-        scores: Some(evaluation.scores.clone()),
+        scores: Some(scores.clone()),
         schedule_note: String::new(),
     };
     let (metrics, printed) = (protocol.metrics(), &config.printed()?);
     write!(out, "{}", Tables { metrics, printed }.terminal(&[row]))?;
-    let record = EvaluationRecord {
-        scores: evaluation.scores,
-        data,
-    };
+    let record = EvaluationRecord { scores, data };
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
@@ -104,14 +107,4 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         record.write(folder)?;
     }
     Ok(())
-}
-
-impl EvaluateArgs {
-    fn options(&self) -> EvaluationOptions {
-        let lengths = BTreeSet::from_iter(self.lengths.iter().map(|&length| length.into()));
-        EvaluationOptions {
-            lengths: lengths.into_iter().collect(),
-            most_windows: None,
-        }
-    }
 }

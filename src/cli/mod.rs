@@ -105,7 +105,9 @@ impl Cli {
 
 /// Says what went wrong; the exit code of it.
 pub fn report(error: &anyhow::Error) -> ExitCode {
-    if output_is_closed(error) {
+    // What reads the output, such as `head`, has seen enough of it.
+    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref());
+    if causes.any(|cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe) {
         return ExitCode::from(OUTPUT_CLOSED);
     }
     notice(format_args!("error: {error:#}"));
@@ -113,10 +115,4 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
         Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
         _ => ExitCode::FAILURE,
     }
-}
-
-/// Whether the error is that what reads the output, such as `head`, has seen enough of it.
-fn output_is_closed(error: &anyhow::Error) -> bool {
-    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref());
-    causes.any(|cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe)
 }

@@ -28,15 +28,13 @@ pub struct Progress {
 impl Progress {
     /// `before`: frames that earlier processes predicted of the schedule's.
     pub fn new(task: &dyn Task<f32>, before: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar = ProgressBar::new(task.frame_steps()).with_style(style);
-            bar.set_position(before);
-            bar
-        });
         let mut progress = Self::lines(String::new(), task, before);
-        progress.bar = bar;
+        progress.bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}");
+            ProgressBar::new(task.frame_steps())
+                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+                .with_position(before)
+        });
         progress
     }
 
@@ -60,8 +58,10 @@ impl Progress {
         let done = (report.frame_steps - self.before) as f64;
         let rate = done / self.begun.elapsed().as_secs_f64().max(1e-9);
         let left = (self.frame_steps - report.frame_steps) as f64 / rate.max(1e-9);
-        let length = report.column("length");
-        let length = length.map_or_else(String::new, |length| format!("  N {length}"));
+        let length = report
+            .column("length")
+            .map(|length| format!("  N {length}"));
+        let length = length.unwrap_or_default();
         let what = format!(
             "{}step {}/{}{length}  loss {:.4}  {rate:.0} frames/s  {} left",
             self.name,

@@ -1,8 +1,9 @@
 //! `--threads`: how many threads a command computes on.
 
-use anyhow::Context as _;
 use clap::Args;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
+
+use crate::training::{TrainingError, pool};
 
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Threads {
@@ -32,11 +33,7 @@ impl Threads {
     ///
     /// # Errors
     /// The system gives no more threads.
-    pub fn pool(self) -> anyhow::Result<ThreadPool> {
-        let count = self.count();
-        ThreadPoolBuilder::new()
-            .num_threads(count)
-            .build()
-            .with_context(|| format!("no pool of {count} threads"))
+    pub fn pool(self) -> Result<ThreadPool, TrainingError> {
+        pool(self.count())
     }
 }

@@ -96,12 +96,10 @@ impl PrintedTables {
             toml::from_str(text).map_err(|cause| bad(cause.to_string().trim_end().into()))?;
         for row in &printed.rows {
             for (metric, values) in &row.values {
-                if values.len() != printed.columns.len() {
+                let (name, found, columns) = (&row.name, values.len(), printed.columns.len());
+                if found != columns {
                     return Err(bad(format!(
-                        "rows.{}.{metric} has {} values for {} columns",
-                        row.name,
-                        values.len(),
-                        printed.columns.len()
+                        "rows.{name}.{metric} has {found} values for {columns} columns"
                     )));
                 }
             }

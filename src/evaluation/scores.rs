@@ -22,11 +22,10 @@ pub struct ScoreRow {
 impl ScoreRow {
     /// Scores by column, in their order.
     pub fn new(columns: impl IntoIterator<Item = (impl fmt::Display, f64)>) -> Self {
+        let columns = columns.into_iter();
+        let columns = columns.map(|(column, score)| (column.to_string(), score));
         Self {
-            columns: columns
-                .into_iter()
-                .map(|(column, score)| (column.to_string(), score))
-                .collect(),
+            columns: columns.collect(),
         }
     }
 
@@ -76,11 +75,10 @@ impl Scores {
     ) -> Self {
         let rows = rows.into_iter().map(|(key, row)| (key.to_string(), row));
         let windows = windows.into_iter();
+        let windows = windows.map(|(column, count)| (column.to_string(), count));
         Self {
             rows: rows.collect(),
-            windows: windows
-                .map(|(column, count)| (column.to_string(), count))
-                .collect(),
+            windows: windows.collect(),
         }
     }
 
@@ -143,17 +141,15 @@ impl<'de> Deserialize<'de> for Scores {
         for (key, row) in entries {
             if key == WINDOWS {
                 let counts = row.columns.into_iter();
-                scores.windows = counts
-                    .map(|(column, count)| (column, count as usize))
-                    .collect();
+                let counts = counts.map(|(column, count)| (column, count as usize));
+                scores.windows = counts.collect();
             } else {
                 scores.rows.push((key, row));
             }
         }
         if scores.rows.is_empty() || scores.windows.is_empty() {
-            return Err(D::Error::custom(
-                "scores have rows by metric, and \"windows\"",
-            ));
+            let expected = "scores have rows by metric, and \"windows\"";
+            return Err(D::Error::custom(expected));
         }
         Ok(scores)
     }

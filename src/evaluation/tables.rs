@@ -40,12 +40,9 @@ impl Tables<'_> {
     /// were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
     /// the paper's, they are ours and their mean is not compared.
     pub fn markdown(&self, rows: &[TableRow], subject: &str) -> String {
-        let tables: Vec<String> = self
-            .tables()
-            .into_iter()
-            .map(|(number, metric)| self.markdown_table(number, metric, rows, subject))
-            .collect();
-        tables.join("\n")
+        let tables = self.tables().into_iter();
+        let text = |(number, metric)| self.markdown_table(number, metric, rows, subject);
+        tables.map(text).collect::<Vec<String>>().join("\n")
     }
 
     /// The metrics that have a table, with its number in the paper: all where the paper prints
@@ -54,13 +51,11 @@ impl Tables<'_> {
         if self.printed.tables.is_empty() {
             return self.metrics.iter().map(|metric| (None, metric)).collect();
         }
-        let tables = self.printed.tables.iter();
-        tables
-            .filter_map(|table| {
-                let of_table = |metric: &&Metric| metric.key == table.metric;
-                Some((table.number, self.metrics.iter().find(of_table)?))
-            })
-            .collect()
+        let tables = self.printed.tables.iter().filter_map(|table| {
+            let of_table = |metric: &&Metric| metric.key == table.metric;
+            Some((table.number, self.metrics.iter().find(of_table)?))
+        });
+        tables.collect()
     }
 
     fn markdown_table(
@@ -126,8 +121,13 @@ impl Tables<'_> {
         let compared = |ours: &[Option<f64>], of: &TableRow| {
             let row = of.scores.as_ref().and_then(|scores| scores.row(metric.key));
             let same = row.is_some_and(|row| row.columns().eq(&self.printed.columns));
-            let paper = paper.as_ref()?;
-            Some(cells(&difference(ours, paper, columns, same), true))
+            // A mean is compared only if it is over the same columns.
+            let values = ours.iter().zip(paper.as_ref()?).zip(columns);
+            let differences = values.map(|((ours, paper), column)| {
+                let compared = same || column != AVERAGE;
+                Some((*ours)? - paper.filter(|_| compared)?)
+            });
+            Some(cells(&differences.collect::<Vec<_>>(), true))
         };
         let absent = || vec![ABSENT.to_string(); columns.len()];
         let by_seed = group.differ_in_seed_only();
@@ -149,9 +149,8 @@ impl Tables<'_> {
             return lines;
         }
         let measured = group.ours.iter();
-        let measured: Vec<(&TableRow, Vec<Option<f64>>)> = measured
-            .filter_map(|row| Some((*row, scores(row)?)))
-            .collect();
+        let measured = measured.filter_map(|row| Some((*row, scores(row)?)));
+        let measured: Vec<(&TableRow, Vec<Option<f64>>)> = measured.collect();
         let spreads: Vec<Option<Spread>> = (0..columns.len())
             .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
             .collect();
@@ -210,10 +209,9 @@ impl Tables<'_> {
             format!("{name:<width$}{cells}\n")
         };
         let header: Vec<String> = columns.iter().map(|it| column_title(it, "")).collect();
-        let measured: Vec<(&TableRow, &Scores)> = rows
-            .iter()
-            .filter_map(|row| Some((row, row.scores.as_ref()?)))
-            .collect();
+        let measured = rows.iter();
+        let measured = measured.filter_map(|row| Some((row, row.scores.as_ref()?)));
+        let measured: Vec<(&TableRow, &Scores)> = measured.collect();
         let mut out = String::new();
         for metric in self.metrics {
             let mut rows = measured.iter().map(|(_, scores)| scores.row(metric.key));
@@ -234,13 +232,11 @@ impl Tables<'_> {
             out.push('\n');
         }
         for (row, scores) in &measured {
-            let counts: Vec<String> = columns
-                .iter()
-                .filter(|column| *column != AVERAGE)
-                .map(|column| scores.windows_of(column))
-                .map(|count| count.map_or("-".into(), |count| count.to_string()))
-                .collect();
-            out += &line(&format!("windows, {}", row.name), &counts);
+            let counted = columns.iter().filter(|column| *column != AVERAGE);
+            let counts = counted.map(|column| scores.windows_of(column));
+            let counts = counts.map(|count| count.map_or("-".into(), |count| count.to_string()));
+            let name = format!("windows, {}", row.name);
+            out += &line(&name, &counts.collect::<Vec<String>>());
         }
         out
     }
@@ -267,16 +263,12 @@ impl Tables<'_> {
     }
 
     fn groups<'r>(&'r self, rows: &'r [TableRow]) -> Vec<Group<'r>> {
-        let mut groups: Vec<Group> = self
-            .printed
-            .rows
-            .iter()
-            .map(|paper| Group {
-                title: paper.title.clone(),
-                paper: Some(paper),
-                ours: rows.iter().filter(|row| row.name == paper.name).collect(),
-            })
-            .collect();
+        let printed = self.printed.rows.iter().map(|paper| Group {
+            title: paper.title.clone(),
+            paper: Some(paper),
+            ours: rows.iter().filter(|row| row.name == paper.name).collect(),
+        });
+        let mut groups: Vec<Group> = printed.collect();
         let ours_alone = |row: &&TableRow| self.printed.row(&row.name).is_none();
         for row in rows.iter().filter(ours_alone) {
             match groups.iter_mut().find(|group| group.title == row.name) {
@@ -362,22 +354,6 @@ impl Group<'_> {
 fn our_values(row: Option<&ScoreRow>, columns: &[String]) -> Vec<Option<f64>> {
     let value = |column: &String| row.and_then(|row| row.at(column));
     columns.iter().map(value).collect()
-}
-
-/// Ours minus the paper's; a mean only if it is over the same columns.
-fn difference(
-    ours: &[Option<f64>],
-    paper: &[Option<f64>],
-    columns: &[String],
-    same_columns: bool,
-) -> Vec<Option<f64>> {
-    let pairs = ours.iter().zip(paper).zip(columns);
-    pairs
-        .map(|((ours, paper), column)| {
-            let compared = same_columns || column != AVERAGE;
-            ours.filter(|_| compared).zip(*paper).map(|(a, b)| a - b)
-        })
-        .collect()
 }
 
 fn cells(values: &[Option<f64>], signed: bool) -> Vec<String> {

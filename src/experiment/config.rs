@@ -192,21 +192,16 @@ impl ExperimentConfig {
         if let Some(norm) = adam.clip_norm {
             positive("optimiser.clip_norm", norm)?;
         }
-        match adam.rate_schedule {
-            None => Ok(()),
-            Some(rate) => ValueError::unless(
-                (0.0..=1.0).contains(&rate.final_share),
-                "optimiser.rate_schedule.final_share",
-                rate.final_share,
-                "at least 0 and at most 1",
-            ),
-        }
+        let share = adam
+            .rate_schedule
+            .map_or(0.0, |schedule| schedule.final_share);
+        let key = "optimiser.rate_schedule.final_share";
+        let valid = (0.0..=1.0).contains(&share);
+        ValueError::unless(valid, key, share, "at least 0 and at most 1")
     }
 }
 
 fn is_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_alphanumeric())
-        && name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c))
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.chars().all(allowed)
 }

@@ -23,16 +23,16 @@ impl EvaluatedRun {
     /// # Errors
     /// A folder has no scores, a file of it is damaged, or the scores are of different data.
     pub fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, ReproduceError> {
-        let runs: Vec<Self> = folders
-            .iter()
-            .map(|folder| Self::read(folder))
-            .collect::<Result<_, _>>()?;
+        let runs = folders.iter().map(|folder| Self::read(folder));
+        let runs: Vec<Self> = runs.collect::<Result<_, _>>()?;
         for pair in runs.windows(2) {
-            if !pair[0].on_the_data_of(&pair[1]) {
+            let [ours, theirs] = [&pair[0], &pair[1]].map(Self::measured);
+            // Scores stand side by side only if they were measured on the same windows.
+            if ours != theirs {
                 return Err(ReproduceError::Refused(format!(
-                    "scores of different data do not stand in one table: {}, but {}",
-                    pair[0].measured(),
-                    pair[1].measured()
+                    "scores of different data do not stand in one table: {} {ours}, but {} {theirs}",
+                    pair[0].folder.display(),
+                    pair[1].folder.display()
                 )));
             }
         }
@@ -63,24 +63,13 @@ impl EvaluatedRun {
         }
     }
 
-    /// Scores stand side by side only if they were measured on the same windows.
-    fn on_the_data_of(&self, other: &Self) -> bool {
-        let (ours, theirs) = (&self.record, &other.record);
-        ours.scores.windows() == theirs.scores.windows()
-            && (ours.data.clips, ours.data.frames) == (theirs.data.clips, theirs.data.frames)
-            && ours.data.data_digest == theirs.data.data_digest
-    }
-
+    /// On what, in words.
     fn measured(&self) -> String {
         let data = &self.record.data;
         let windows: BTreeMap<_, _> = self.record.scores.windows().iter().cloned().collect();
         format!(
-            "{} on {} test clips ({} frames, windows by length {:?}) of data with digest {}",
-            self.folder.display(),
-            data.clips,
-            data.frames,
-            windows,
-            data.data_digest
+            "on {} test clips ({} frames, windows by length {windows:?}) of data with digest {}",
+            data.clips, data.frames, data.data_digest
         )
     }
 }

@@ -119,15 +119,14 @@ impl ExperimentConfig {
         flatten("", &Value::Table(self.to_table()?), &mut ours);
         flatten("", &Value::Table(other.to_table()?), &mut theirs);
         let keys: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
-        let differing = keys
+        let value =
+            |side: &BTreeMap<_, String>, key| side.get(key).map_or("none".into(), String::clone);
+        let values = keys
             .into_iter()
-            .map(|key| (key, [&ours, &theirs].map(|side| side.get(key))))
-            .filter(|(_, [ours, theirs])| ours != theirs);
+            .map(|key| (key, value(&ours, key), value(&theirs, key)));
+        let differing = values.filter(|(_, ours, theirs)| ours != theirs);
         Ok(differing
-            .map(|(key, sides)| {
-                let [ours, theirs] = sides.map(|side| side.map_or("none", String::as_str));
-                format!("{key}: {ours}, {theirs}")
-            })
+            .map(|(key, ours, theirs)| format!("{key}: {ours}, {theirs}"))
             .collect())
     }
 
@@ -233,10 +232,8 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
     };
     let (outermost, inner) = (parts[0], &parts[1..]);
     let within = |value, part: &&str| Table::from_iter([(part.trim().to_string(), value)]);
-    let value = inner
-        .iter()
-        .rev()
-        .fold(value, |value, part| Value::Table(within(value, part)));
+    let inner = inner.iter().rev();
+    let value = inner.fold(value, |value, part| Value::Table(within(value, part)));
     Ok(Layer {
         origin: format!("--set {set}"),
         table: within(value, &outermost),
@@ -246,6 +243,7 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
 /// Merges the layers onto the defaults and checks after each, so that an error names the layer that
 /// brought it.
 fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
+    let no_kinds = || ConfigError::Refused("the registry: knows no kind of model".into());
     let mut kind = registry::kinds().into_iter().next().ok_or_else(no_kinds)?;
     let mut table = Table::try_from(Shared::default())?;
     table.remove("name");
@@ -284,10 +282,8 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     // A budget is over any model; what it says of a part that this one lacks makes no other
     // experiment of it.
     let groups = config.model.rate_groups();
-    config
-        .optimiser
-        .rates
-        .retain(|group, _| groups.contains(&group.as_str()));
+    let rates = &mut config.optimiser.rates;
+    rates.retain(|group, _| groups.contains(&group.as_str()));
     let protocol = config.protocol();
     if let Some(validation) = &mut config.validation
         && validation.lengths.is_none()
@@ -296,10 +292,6 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
         validation.lengths = (!lengths.is_empty()).then(|| lengths.to_vec());
     }
     Ok(config)
-}
-
-fn no_kinds() -> ConfigError {
-    ConfigError::Refused("the registry: knows no kind of model".into())
 }
 
 fn find_kind(named: &Value, origin: &str) -> Result<Arc<dyn ModelKind>, ConfigError> {
@@ -325,32 +317,19 @@ fn parse_layer(
         ConfigError::Refused(format!("{origin}: {message}"))
     };
     let own = kind.defaults();
-    let (own, mut shared): (Table, Table) = table
-        .clone()
-        .into_iter()
-        .partition(|(key, _)| own.contains_key(key));
-    let name = kind.default_name();
-    shared
-        .entry("name")
-        .or_insert_with(|| Value::String(name.into()));
-    let Shared {
-        name,
-        seed,
-        data,
-        optimiser,
-        checkpoint,
-        log,
-        validation,
-    } = shared.try_into().map_err(unread)?;
+    let keys = table.clone().into_iter();
+    let (own, mut shared): (Table, Table) = keys.partition(|(key, _)| own.contains_key(key));
+    shared.entry("name").or_insert(kind.default_name().into());
+    let shared: Shared = shared.try_into().map_err(unread)?;
     let config = ExperimentConfig {
-        name,
-        seed,
-        data,
+        name: shared.name,
+        seed: shared.seed,
+        data: shared.data,
         model: kind.read(own).map_err(unread)?,
-        optimiser,
-        checkpoint,
-        log,
-        validation,
+        optimiser: shared.optimiser,
+        checkpoint: shared.checkpoint,
+        log: shared.log,
+        validation: shared.validation,
     };
     // A model without fields takes any key without a word: what does not come back out was not
     // understood.
@@ -364,13 +343,9 @@ fn parse_layer(
 
 /// Whether a layer gives the dotted key.
 fn has(table: &Table, key: &str) -> bool {
-    match key.split_once('.') {
-        None => table.contains_key(key),
-        Some((first, rest)) => match table.get(first) {
-            Some(Value::Table(inner)) => has(inner, rest),
-            _ => false,
-        },
-    }
+    let mut parts = key.split('.');
+    let first = parts.next().and_then(|part| table.get(part));
+    parts.fold(first, |value, part| value?.get(part)).is_some()
 }
 
 impl PartialEq for ExperimentConfig {

@@ -7,8 +7,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use rayon::ThreadPoolBuilder;
-
 use super::ReproduceError;
 use super::results::RowResults;
 use super::rows::Row;
@@ -16,7 +14,7 @@ use crate::data::{DataPart, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, Scores};
 use crate::models::Generator;
 use crate::run::{Manifest, RunFolder, RunState};
-use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
+use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError, pool};
 
 /// Is told how a reproduction goes, by several threads where several rows are trained at the same
 /// time, and may stop it.
@@ -237,11 +235,7 @@ impl Reproduction<'_> {
     }
 
     fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<Scores, ReproduceError> {
-        let threads = self.threads;
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|cause| {
-            ReproduceError::Refused(format!("no pool of {threads} threads: {cause}"))
-        })?;
+        let pool = pool(self.threads)?;
         let protocol = row.config.protocol();
         let evaluation =
             pool.install(|| self.observer.evaluate(&*protocol, model, self.dataset))?;

@@ -134,12 +134,10 @@ impl RowResults {
     /// Files that are there, by their names.
     pub fn files(&self) -> Vec<PathBuf> {
         let [scores, data] = EvaluationRecord::files(DataPart::Test);
-        let own =
-            [scores, data, LOSS_CURVE, VALIDATION_CURVE].map(|name| self.folder.path().join(name));
-        [self.folder.config_path(), self.folder.manifest_path()]
-            .into_iter()
-            .chain(own)
-            .filter(|path| path.exists())
-            .collect()
+        let own = [scores, data, LOSS_CURVE, VALIDATION_CURVE];
+        let mut files = vec![self.folder.config_path(), self.folder.manifest_path()];
+        files.extend(own.map(|name| self.folder.path().join(name)));
+        files.retain(|path| path.exists());
+        files
     }
 }

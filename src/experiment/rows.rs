@@ -48,20 +48,17 @@ pub fn read(
 ) -> Result<(Vec<Row>, PrintedTables), ReproduceError> {
     let mut configs: Vec<ExperimentConfig> = Vec::new();
     for file in files(folder)? {
-        let load =
-            |sets: &[String]| ExperimentConfig::load_under(&file, budget, sets).map_err(Box::new);
-        let no_row = |source| ReproduceError::NoRow {
-            file: file.clone(),
-            source,
+        let load = |sets: &[String]| {
+            let config = ExperimentConfig::load_under(&file, budget, sets);
+            config.map_err(|source| ReproduceError::NoRow {
+                file: file.clone(),
+                source: source.into(),
+            })
         };
-        let name = load(&[]).map_err(no_row)?.name;
-        let config = if only.is_empty() || only.contains(&name) {
-            load(sets).map_err(no_row)?
-        } else {
-            let knows = |set: &&String| load(std::slice::from_ref(*set)).is_ok();
-            let known: Vec<String> = sets.iter().filter(knows).cloned().collect();
-            load(&known).map_err(no_row)?
-        };
+        let name = load(&[])?.name;
+        let chosen = only.is_empty() || only.contains(&name);
+        let known = |set: &&String| chosen || load(std::slice::from_ref(*set)).is_ok();
+        let config = load(&sets.iter().filter(known).cloned().collect::<Vec<_>>())?;
         if configs.iter().any(|other| other.name == config.name) {
             return Err(ReproduceError::Refused(format!(
                 "two configs in {} are called {name}; give each a name of its own",
@@ -105,13 +102,10 @@ pub fn read(
         }
     }
     rows.extend(further);
-    for row in &rows {
-        row.config
-            .validate()
-            .map_err(|source| ReproduceError::Seeds {
-                name: row.config.name.clone(),
-                source,
-            })?;
+    for Row { config, .. } in &rows {
+        let name = config.name.clone();
+        let valid = config.validate();
+        valid.map_err(|source| ReproduceError::Seeds { name, source })?;
     }
     Ok((rows, printed))
 }

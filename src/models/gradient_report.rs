@@ -36,8 +36,8 @@ impl GradientReport {
     /// # Errors
     /// An error is too large, or too few numbers could be compared.
     pub fn verdict(&self) -> Result<(), ModelError> {
-        let (error, kinks) = (self.error(), self.kinks());
-        let drawn = self.compared() + kinks;
+        let (error, kinks) = (self.error(), self.sum(CheckReport::kinks));
+        let drawn = self.sum(CheckReport::compared) + kinks;
         let reason = if error > TOLERANCE {
             format!("a gradient is wrong: its error {error:.1e} is above {TOLERANCE:.0e}")
         } else if drawn == 0 || kinks as f64 > MOST_KINKS * drawn as f64 {
@@ -56,12 +56,8 @@ impl GradientReport {
         errors.fold(0.0, f64::max)
     }
 
-    fn compared(&self) -> usize {
-        self.cases.iter().map(|(_, report)| report.compared()).sum()
-    }
-
-    fn kinks(&self) -> usize {
-        self.cases.iter().map(|(_, report)| report.kinks()).sum()
+    fn sum(&self, of: fn(&CheckReport) -> usize) -> usize {
+        self.cases.iter().map(|(_, report)| of(report)).sum()
     }
 }
 
@@ -73,8 +69,8 @@ impl fmt::Display for GradientReport {
         writeln!(
             f,
             "{} numbers compared, {} at kinks left out; largest error {:.1e}",
-            self.compared(),
-            self.kinks(),
+            self.sum(CheckReport::compared),
+            self.sum(CheckReport::kinks),
             self.error()
         )
     }

@@ -34,10 +34,9 @@ pub fn add(kind: impl ModelKind + 'static) {
 /// All kinds: those of this crate, then those added, in their order.
 pub fn kinds() -> Vec<Arc<dyn ModelKind>> {
     let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
-    built_in()
-        .into_iter()
-        .chain(added.iter().cloned())
-        .collect()
+    let mut kinds = built_in();
+    kinds.extend(added.iter().cloned());
+    kinds
 }
 
 /// The kind of this name.

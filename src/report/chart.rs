@@ -88,10 +88,7 @@ impl Chart {
         for line in &self.lines {
             let mut points = line.points.iter();
             if !points.all(|(x, y)| x.is_finite() && y.is_finite()) {
-                return Err(FigureError::NotFinite {
-                    figure: self.title.clone(),
-                    series: line.name.clone(),
-                });
+                return Err(FigureError::not_finite(&self.title, &line.name));
             }
         }
         let drawable = |&(x, y): &(f64, f64)| self.x.shows(x) && self.y.shows(y);
@@ -100,10 +97,8 @@ impl Chart {
             points.copied().filter(drawable)
         };
         if points().next().is_none() {
-            return Err(FigureError::Empty {
-                figure: self.title.clone(),
-                what: "no line has a point that its axes can show",
-            });
+            let what = "no line has a point that its axes can show";
+            return Err(FigureError::empty(&self.title, what));
         }
         let across = Range::of(&self.x, points().map(|point| point.0), LEFT, RIGHT);
         let up = Range::of(&self.y, points().map(|point| point.1), BOTTOM, TOP);
@@ -172,7 +167,7 @@ fn draw_line(svg: &mut Svg, line: &Line, places: &[[f64; 2]], index: usize) {
     svg.line(&[[RIGHT + 18.0, y - 4.0], [RIGHT + 46.0, y - 4.0]], stroke);
     if line.dots {
         for &place in places.iter().chain([&[RIGHT + 32.0, y - 4.0]]) {
-            svg.ellipse(place, [3.6, 3.6], colour, Stroke::solid("#ffffff", 1.0));
+            svg.circle(place, 3.6, colour, Stroke::solid("#ffffff", 1.0));
         }
     }
     svg.text([LEGEND, y], &line.name, Font::new(12.5, INK, Anchor::Start));

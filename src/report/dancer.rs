@@ -78,7 +78,7 @@ impl Drawn {
             svg.line(&ends, Stroke::solid(palette.fill, width));
             if joint == HEAD_JOINT {
                 let outline = Stroke::solid(palette.outline, 1.0);
-                svg.ellipse(at(joint), [HEAD, HEAD], palette.fill, outline);
+                svg.circle(at(joint), HEAD, palette.fill, outline);
             }
         }
     }
@@ -112,8 +112,9 @@ fn bone_width(joint: usize) -> f64 {
 
 /// The body part that a joint belongs to.
 fn part_of(joint: usize) -> usize {
+    let has_joint = |part: &&[(usize, f64)]| part.iter().any(|&(member, _)| member == joint);
     PART_WEIGHTS
         .iter()
-        .position(|part| part.iter().any(|&(member, _)| member == joint))
+        .position(|part| has_joint(part))
         .unwrap_or(0)
 }

@@ -24,6 +24,16 @@ pub enum FigureError {
 }
 
 impl FigureError {
+    pub(super) fn empty(figure: &str, what: &'static str) -> Self {
+        let figure = figure.into();
+        Self::Empty { figure, what }
+    }
+
+    pub(super) fn not_finite(figure: &str, series: &str) -> Self {
+        let (figure, series) = (figure.into(), series.into());
+        Self::NotFinite { figure, series }
+    }
+
     /// A row that has other frames than the first.
     pub(super) fn frames(figure: &str, row: &str, found: usize, expected: usize) -> Self {
         Self::Unfit(format!(

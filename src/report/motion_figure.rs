@@ -204,10 +204,7 @@ impl MotionFigure {
     }
 
     fn check(&self) -> Result<(), FigureError> {
-        let empty = |what| FigureError::Empty {
-            figure: self.title.clone(),
-            what,
-        };
+        let empty = |what| FigureError::empty(&self.title, what);
         let first = self.rows.first().ok_or_else(|| empty("no rows"))?;
         for row in &self.rows {
             if row.frames.is_empty() {
@@ -226,10 +223,7 @@ impl MotionFigure {
             if !(joints.all(|joint| joint.is_finite())
                 && row.paths.iter().all(RootPaths::is_finite))
             {
-                return Err(FigureError::NotFinite {
-                    figure: self.title.clone(),
-                    series: row.label.clone(),
-                });
+                return Err(FigureError::not_finite(&self.title, &row.label));
             }
         }
         Ok(())
@@ -252,7 +246,7 @@ impl MotionFigure {
         let mut x = 22.0;
         for (palette, name, _) in entries.iter().filter(|entry| entry.2) {
             let outline = Stroke::solid(palette.outline, 1.2);
-            svg.ellipse([x, 49.0], [6.0, 6.0], palette.fill, outline);
+            svg.circle([x, 49.0], 6.0, palette.fill, outline);
             svg.text([x + 12.0, 53.0], name, font);
             x += 40.0 + 7.0 * name.len() as f64;
         }

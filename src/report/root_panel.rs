@@ -61,11 +61,8 @@ impl RootPaths {
 
     fn corners(&self) -> ([f64; 2], [f64; 2]) {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for point in [&self.target, &self.generated]
-            .map(|path| self.flat(path))
-            .iter()
-            .flatten()
-        {
+        let paths = [&self.target, &self.generated].map(|path| self.flat(path));
+        for point in paths.iter().flatten() {
             for axis in 0..2 {
                 low[axis] = low[axis].min(point[axis]);
                 high[axis] = high[axis].max(point[axis]);
@@ -112,7 +109,7 @@ impl RootPaths {
         };
         svg.line(&target, dashed);
         for &point in &target {
-            svg.ellipse(point, [1.8, 1.8], TARGET, Stroke::solid(TARGET, 0.5));
+            svg.circle(point, 1.8, TARGET, Stroke::solid(TARGET, 0.5));
         }
         let note = match self.view {
             PathView::Above => format!("from above, {span:.0} cm wide"),

@@ -62,11 +62,8 @@ impl RunTable {
 impl fmt::Display for RunTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let header = HEADER.map(String::from);
-        let lines = || {
-            [&header]
-                .into_iter()
-                .chain(self.rows.iter().map(|row| &row.cells))
-        };
+        let rows = self.rows.iter().map(|row| &row.cells);
+        let lines = || std::iter::once(&header).chain(rows.clone());
         let widths: [usize; HEADER.len()] = std::array::from_fn(|column| {
             let cells = lines().map(|line| line[column].chars().count());
             cells.max().unwrap_or_default()
@@ -115,6 +112,7 @@ fn name(run: &Path, folder: &Path) -> String {
 }
 
 /// A line of the table, and what is wrong with the run.
+#[derive(Default)]
 struct RunLine {
     cells: [String; HEADER.len()],
     problems: Vec<String>,
@@ -122,13 +120,9 @@ struct RunLine {
 
 impl RunLine {
     fn read(folder: &Path, name: String) -> Self {
-        let mut row = Self {
-            cells: Default::default(),
-            problems: Vec::new(),
-        };
+        let mut row = Self::default();
         row.cells[0] = name;
-        let run = RunFolder::open(folder);
-        if let Err(error) = row.fill(&run) {
+        if let Err(error) = row.fill(&RunFolder::open(folder)) {
             row.cells[2] = "damaged".into();
             row.problems.push(error.to_string());
         }

@@ -92,11 +92,9 @@ fn series(metric: &Metric, printed: &PrintedTables, rows: &[TableRow]) -> Vec<Sc
         if series.iter().any(|known| known.name == name) {
             continue;
         }
-        let seeds: Vec<&ScoreRow> = rows
-            .iter()
-            .filter(|other| other.name == row.name)
-            .filter_map(|other| other.scores.as_ref()?.row(metric.key))
-            .collect();
+        let seeds = rows.iter().filter(|other| other.name == row.name);
+        let scores = seeds.filter_map(|seed| seed.scores.as_ref()?.row(metric.key));
+        let seeds: Vec<&ScoreRow> = scores.collect();
         let Some(first) = seeds.first() else {
             continue;
         };

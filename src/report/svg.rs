@@ -91,14 +91,9 @@ impl Svg {
     }
 
     /// A filled rectangle with its upper left corner at `corner`.
-    pub fn rectangle(&mut self, corner: [f64; 2], size: [f64; 2], fill: &str) {
+    fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: &str) {
         self.push(format_args!(
-            r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{:.2}" fill="{}"/>"#,
-            corner[0],
-            corner[1],
-            size[0],
-            size[1],
-            escape(fill)
+            r#"<rect x="{x:.2}" y="{y:.2}" width="{width:.2}" height="{height:.2}" fill="{fill}"/>"#
         ));
     }
 
@@ -120,14 +115,10 @@ impl Svg {
         ));
     }
 
-    /// An ellipse with half axes `radii`.
-    pub fn ellipse(&mut self, centre: [f64; 2], radii: [f64; 2], fill: &str, stroke: Stroke) {
+    /// A circle.
+    pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, stroke: Stroke) {
         self.push(format_args!(
-            r#"<ellipse cx="{:.2}" cy="{:.2}" rx="{:.2}" ry="{:.2}" fill="{}" stroke="{}" stroke-width="{:.2}"/>"#,
-            centre[0],
-            centre[1],
-            radii[0],
-            radii[1],
+            r#"<ellipse cx="{x:.2}" cy="{y:.2}" rx="{radius:.2}" ry="{radius:.2}" fill="{}" stroke="{}" stroke-width="{:.2}"/>"#,
             escape(fill),
             escape(stroke.colour),
             stroke.width
@@ -142,10 +133,9 @@ impl Svg {
             Anchor::End => "end",
         };
         let [x, y] = position;
-        let weight = if font.bold {
-            r#" font-weight="bold""#
-        } else {
-            ""
+        let weight = match font.bold {
+            true => r#" font-weight="bold""#,
+            false => "",
         };
         let turn = match font.turn {
             0.0 => String::new(),

@@ -82,9 +82,8 @@ fn name(path: &Path) -> Cow<'_, str> {
 pub fn list(folder: &Path) -> Result<Vec<(u64, PathBuf)>, FileError> {
     let step = |path: &Path| name(path).strip_prefix(PREFIX)?.parse().ok();
     let paths = entries(folder)?.into_iter();
-    let mut found: Vec<_> = paths
-        .filter_map(|path| Some((step(&path)?, path)))
-        .collect();
+    let found = paths.filter_map(|path| Some((step(&path)?, path)));
+    let mut found: Vec<_> = found.collect();
     found.sort_unstable();
     Ok(found)
 }

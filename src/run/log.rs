@@ -49,16 +49,16 @@ pub(crate) fn read(path: &Path) -> Result<Vec<LogLine>, RunError> {
     whole.lines().enumerate().map(parse).collect()
 }
 
-/// How far the last line of a log says that the training is.
+/// How far a line of a log says that the training is.
 #[derive(Debug, Clone, Copy, Deserialize)]
-pub(crate) struct Last {
+pub(crate) struct Progress {
     pub step: u64,
     pub frame_steps: u64,
     pub frame_steps_per_second: f64,
 }
 
 /// The last whole line, if there is one, without reading the others.
-pub(crate) fn last(path: &Path) -> Option<Last> {
+pub(crate) fn last(path: &Path) -> Option<Progress> {
     let mut file = File::open(path).ok()?;
     let len = file.metadata().ok()?.len();
     file.seek(SeekFrom::Start(len.saturating_sub(LAST_LINES)))
@@ -74,11 +74,6 @@ pub(crate) fn last(path: &Path) -> Option<Last> {
 pub(crate) struct Log {
     path: PathBuf,
     file: File,
-}
-
-#[derive(Deserialize)]
-struct Line {
-    step: u64,
 }
 
 impl Log {
@@ -100,8 +95,8 @@ impl Log {
             line.clear();
             let read = reader.read_until(b'\n', &mut line).map_err(at("read"))?;
             let whole = line.ends_with(b"\n");
-            match serde_json::from_slice::<Line>(&line) {
-                Ok(Line { step }) if whole && step <= steps => kept += read as u64,
+            match serde_json::from_slice::<Progress>(&line) {
+                Ok(at) if whole && at.step <= steps => kept += read as u64,
                 _ => break,
             }
         }

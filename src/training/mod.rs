@@ -17,4 +17,5 @@ mod validation;
 pub use error::TrainingError;
 pub use report::StepReport;
 pub use resume::Resumed;
+pub use step::pool;
 pub use trainer::{Outcome, Trainer};

@@ -30,6 +30,15 @@ pub struct Losses {
     buffers: Vec<(BufferId, Vec<f64>)>,
 }
 
+/// Threads for rayon.
+///
+/// # Errors
+/// The system gives no more threads.
+pub fn pool(threads: usize) -> Result<ThreadPool, TrainingError> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|cause| TrainingError::Refused(format!("no pool of {threads} threads: {cause}")))
+}
+
 /// Threads and buffers that one step leaves for the next.
 pub struct Stepper {
     pool: ThreadPool,
@@ -42,14 +51,8 @@ impl Stepper {
     /// # Errors
     /// No threads to be had.
     pub fn new(threads: usize) -> Result<Self, TrainingError> {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|cause| {
-                TrainingError::Refused(format!("no pool of {threads} threads: {cause}"))
-            })?;
         Ok(Self {
-            pool,
+            pool: pool(threads)?,
             workspaces: Mutex::new(Vec::new()),
             gradients: Vec::new(),
         })
@@ -109,12 +112,11 @@ impl Stepper {
         for losses in losses {
             let losses = losses.map_err(|cause| failure(input, cause))?;
             sum.total += losses.total;
+            for ((_, sum), (_, term)) in sum.terms.iter_mut().zip(&losses.terms) {
+                *sum += term;
+            }
             if sum.terms.is_empty() {
                 sum.terms = losses.terms;
-            } else {
-                for ((_, sum), (_, term)) in sum.terms.iter_mut().zip(losses.terms) {
-                    *sum += term;
-                }
             }
             sum.buffers.extend(losses.buffers);
         }
@@ -131,9 +133,8 @@ impl Stepper {
                 }
             }
             Err(error) => {
-                let cause = trace(input, parameters, gradients)
-                    .map_or_else(|| error.to_string(), |cause| cause.to_string());
-                Err(non_finite(input, cause))
+                let cause = trace(input, parameters, gradients).map(|cause| cause.to_string());
+                Err(non_finite(input, cause.unwrap_or(error.to_string())))
             }
         }
     }
@@ -197,13 +198,10 @@ fn run_shard(
     }
     let losses = input.step.losses(&mut tape, shard)?;
     let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
+    let terms = losses.terms.iter();
     let values = Losses {
         total: number(losses.total),
-        terms: losses
-            .terms
-            .iter()
-            .map(|&(name, var)| (name, number(var)))
-            .collect(),
+        terms: terms.map(|&(name, var)| (name, number(var))).collect(),
         buffers: losses.buffers,
     };
     if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {

@@ -15,7 +15,7 @@ use crate::models::settings::{InitialRng, TaskSetting};
 use crate::models::{Generator, ModelError, Streams, Task, weights};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
-use crate::run::{FileError, RunError, RunFolder, RunState};
+use crate::run::{RunError, RunFolder, RunState};
 
 /// A training: weights, optimiser and place in the schedule.
 pub struct Trainer<'d> {
@@ -134,12 +134,9 @@ impl<'d> Trainer<'d> {
     /// # Errors
     /// See [`weights::to_safetensors`].
     pub fn weights_file(&self) -> Result<Vec<u8>, RunError> {
-        let statistics = self.task.statistics();
-        Ok(weights::to_safetensors(
-            &self.parameters,
-            &statistics,
-            &self.config_toml,
-        )?)
+        let (statistics, config) = (self.task.statistics(), &self.config_toml);
+        let file = weights::to_safetensors(&self.parameters, &statistics, config);
+        Ok(file?)
     }
 
     /// The model with the weights as they are.
@@ -188,10 +185,7 @@ impl<'d> Trainer<'d> {
         if let Some(record) = &mut record {
             record.save(self)?;
             let weights = self.weights_file()?;
-            record
-                .run
-                .write_weights(&weights)
-                .map_err(FileError::from)?;
+            record.run.write_weights(&weights)?;
             record.end(self, RunState::Finished)?;
         }
         Ok(Outcome::Finished)
@@ -209,9 +203,8 @@ impl<'d> Trainer<'d> {
             done,
             learning_rate,
         };
-        let (losses, gradient_norm) =
-            self.stepper
-                .step(input, &mut self.parameters, &mut self.adam)?;
+        let (stepper, adam) = (&mut self.stepper, &mut self.adam);
+        let (losses, gradient_norm) = stepper.step(input, &mut self.parameters, adam)?;
         let frames = step.frames();
         self.frame_steps += frames;
         let seconds = start.elapsed().as_secs_f64();

@@ -3,7 +3,7 @@
 use super::error::TrainingError;
 use crate::data::{DataPart, Dataset, Recording};
 use crate::evaluation::{EvaluationError, EvaluationOptions, Protocol, Scores};
-use crate::experiment::{ExperimentConfig, ValidationConfig};
+use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 
 /// What a training scores itself by.
@@ -23,17 +23,12 @@ impl<'d> Validation<'d> {
         config: &ExperimentConfig,
         dataset: &'d Dataset,
     ) -> Result<Option<Self>, TrainingError> {
-        let Some(ValidationConfig {
-            every_steps,
-            windows,
-            lengths,
-        }) = &config.validation
-        else {
+        let Some(asked) = &config.validation else {
             return Ok(None);
         };
         let options = EvaluationOptions {
-            lengths: lengths.clone().unwrap_or_default(),
-            most_windows: Some(*windows),
+            lengths: asked.lengths.clone().unwrap_or_default(),
+            most_windows: Some(asked.windows),
         };
         let protocol = config.model.protocol(&config.data, &options);
         let frames = DataPart::Validation.of(dataset)?.iter();
@@ -47,7 +42,7 @@ impl<'d> Validation<'d> {
             None => Ok(Some(Self {
                 dataset,
                 protocol,
-                every_steps: *every_steps,
+                every_steps: asked.every_steps,
             })),
         }
     }

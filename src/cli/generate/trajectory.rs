@@ -62,12 +62,8 @@ impl TrajectoryArgs {
         mut request: SequenceRequest,
         keyframes: &Keyframes,
     ) -> anyhow::Result<(SequenceRequest, Vec<ControlWarning>)> {
-        let numbers = [
-            ("turn", self.turn),
-            ("scale", self.scale),
-            ("raise", self.raise),
-        ];
-        for (flag, value) in numbers {
+        let flags = ["turn", "scale", "raise"];
+        for (flag, value) in flags.into_iter().zip([self.turn, self.scale, self.raise]) {
             if let Some(value) = value.filter(|value| value.is_nan() || value.abs() > 1e5) {
                 anyhow::bail!("--{flag} {value}: expected a number between -100000 and 100000");
             }

@@ -12,7 +12,7 @@ use crate::motion::placement::world_positions;
 use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
 /// How far one predicted window is from the recorded one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WindowScores {
     /// The window's term of eq. 12: mean over frames of `||p~^b - p^b||_2`, the norm of the
     /// 69-number difference, cm.
@@ -64,29 +64,22 @@ pub fn window_scores(
     let length = rows - 1;
     check_frames(predicted, length)?;
 
-    let mut sums = WindowScores {
-        body_position: 0.0,
-        velocity_factor: 0.0,
-        root: 0.0,
-        foot_travel: 0.0,
-        foot_contacts: 0,
-    };
+    let mut sums = WindowScores::default();
     let mut before_world = world_positions(recorded.row(0));
     let mut before = recorded.row(0);
     for (truth, frame) in recorded.rows().into_iter().skip(1).zip(predicted.rows()) {
         let distance = |range: Range<usize>| {
-            range
-                .map(|column| (frame[column] - truth[column]).powi(2))
-                .sum::<f64>()
-                .sqrt()
+            let squares = range.map(|column| (frame[column] - truth[column]).powi(2));
+            squares.sum::<f64>().sqrt()
         };
-        let factor_error: f64 = velocity_factors_between(before, frame)
+        let factors = velocity_factors_between(before, frame);
+        let wanted = truth.slice(s![VELOCITY_FACTORS]);
+        let errors = factors
             .iter()
-            .zip(truth.slice(s![VELOCITY_FACTORS]))
-            .map(|(predicted, wanted)| (predicted - wanted).abs())
-            .sum();
+            .zip(wanted)
+            .map(|(x, wanted)| (x - wanted).abs());
         sums.body_position += distance(BODY_POSITIONS);
-        sums.velocity_factor += factor_error / PARTS as f64;
+        sums.velocity_factor += errors.sum::<f64>() / PARTS as f64;
         sums.root += distance(ROOT_POSITION);
         let world = world_positions(frame);
         for (joint, on) in FOOT_JOINTS.into_iter().zip(in_contact(truth)) {
@@ -125,12 +118,9 @@ pub fn means(windows: &[WindowScores], delta_v: f64, delta_r: f64) -> [f64; 3] {
     let share = |hit: &dyn Fn(&WindowScores) -> bool| {
         windows.iter().filter(|window| hit(window)).count() as f64 / count
     };
+    let distances = windows.iter().map(|window| window.body_position);
     [
-        windows
-            .iter()
-            .map(|window| window.body_position)
-            .sum::<f64>()
-            / count,
+        distances.sum::<f64>() / count,
         share(&|window| window.velocity_factor < delta_v),
         share(&|window| window.root < delta_r),
     ]

@@ -106,12 +106,8 @@ impl Protocol for Equations {
         data: &Dataset,
         part: DataPart,
     ) -> Result<Evaluation, EvaluationError> {
-        let clips = DanceClip::measure_all(part.of(data)?, &self.features).map_err(|error| {
-            EvaluationError::Data {
-                reason: error.to_string(),
-            }
-        })?;
-        self.evaluate_clips(subject, &clips)
+        let clips = DanceClip::measure_all(part.of(data)?, &self.features);
+        self.evaluate_clips(subject, &clips.map_err(|error| bad(error.to_string()))?)
     }
 }
 
@@ -150,11 +146,9 @@ impl Equations {
         let mut warnings = Vec::new();
         for &length in &self.lengths {
             if length == 0 {
-                return Err(EvaluationError::Data {
-                    reason:
-                        "a length of 0 frames has nothing to predict; give lengths of 1 or more"
-                            .into(),
-                });
+                let reason =
+                    "a length of 0 frames has nothing to predict; give lengths of 1 or more";
+                return Err(bad(reason.into()));
             }
             let mut cut = windows(&clip_frames, length);
             if cut.windows.is_empty() {
@@ -177,7 +171,11 @@ impl Equations {
             if let Some(most) = self.most_windows {
                 cut.windows = spread(&cut.windows, most);
             }
-            measured.push((length, self.measure(model, clips, &cut.windows, length)?));
+            let chunks = cut.windows.par_chunks(self.chunk.max(1));
+            let scores: Vec<Vec<WindowScores>> = chunks
+                .map(|chunk| measure_chunk(model, clips, chunk, length))
+                .collect::<Result<_, _>>()?;
+            measured.push((length, scores.concat()));
         }
         Ok(Evaluation {
             scores: self.scores(&measured),
@@ -196,10 +194,8 @@ impl Equations {
             .map(|metric| row(&|windows| means(windows, velocity, root)[metric]))
             .collect();
         let skate = |windows: &[WindowScores]| foot_skate(windows).unwrap_or(f64::NAN);
-        if measured
-            .iter()
-            .all(|(_, windows)| skate(windows).is_finite())
-        {
+        let mut lengths = measured.iter();
+        if lengths.all(|(_, windows)| skate(windows).is_finite()) {
             rows.push(row(&skate));
         }
         let counts = measured.iter();
@@ -208,21 +204,10 @@ impl Equations {
             counts.map(|(length, windows)| (length, windows.len())),
         )
     }
+}
 
-    /// Scores of the windows of one length, in their order.
-    fn measure(
-        &self,
-        model: &dyn Generator,
-        clips: &[DanceClip],
-        windows: &[Window],
-        length: usize,
-    ) -> Result<Vec<WindowScores>, EvaluationError> {
-        let chunks: Vec<Vec<WindowScores>> = windows
-            .par_chunks(self.chunk.max(1))
-            .map(|chunk| measure_chunk(model, clips, chunk, length))
-            .collect::<Result<_, _>>()?;
-        Ok(chunks.into_iter().flatten().collect())
-    }
+fn bad(reason: String) -> EvaluationError {
+    EvaluationError::Data { reason }
 }
 
 /// At most `most` of the windows, evenly spread over them.
@@ -239,22 +224,18 @@ fn measure_chunk(
     chunk: &[Window],
     length: usize,
 ) -> Result<Vec<WindowScores>, EvaluationError> {
-    let recorded: Vec<_> = chunk
-        .iter()
-        .map(|window| window_features(&clips[window.clip].features, window.start, length))
-        .collect();
+    let features = |it: &Window| window_features(&clips[it.clip].features, it.start, length);
+    let recorded: Vec<_> = chunk.iter().map(features).collect();
     let windows = || chunk.iter().zip(&recorded);
     let requests: Vec<_> = windows()
         .map(|(window, features)| {
             let clip = &clips[window.clip];
             window_request(&clip.clip, window.start, features.view()).ok_or_else(|| {
                 let (poses, frames) = (clip.clip.poses.len(), clip.features.nrows());
-                EvaluationError::Data {
-                    reason: format!(
-                        "{}: has {poses} poses but features of {frames} frames",
-                        clip.name
-                    ),
-                }
+                bad(format!(
+                    "{}: has {poses} poses but features of {frames} frames",
+                    clip.name
+                ))
             })
         })
         .collect::<Result<_, _>>()?;
@@ -270,14 +251,10 @@ fn measure_chunk(
         failed(what, source)
     })?;
     if predicted.len() != chunk.len() {
-        return Err(EvaluationError::Data {
-            reason: format!(
-                "{} gave {} answers to {} requests",
-                model.name(),
-                predicted.len(),
-                chunk.len()
-            ),
-        });
+        let (model, answers, requests) = (model.name(), predicted.len(), chunk.len());
+        return Err(bad(format!(
+            "{model} gave {answers} answers to {requests} requests"
+        )));
     }
     windows()
         .zip(&predicted)

@@ -216,7 +216,7 @@ impl TransformerController {
         let (u, d) = self.positions.dim();
         let (weight, bias) = (tape.block(embedding.weight), tape.block(embedding.bias));
         let channels = tape.shape(weight)[1];
-        let positions = constant(tape, &[d, u], &self.positions.t());
+        let positions = constant(tape, &[d, u], self.positions.t());
         let bias = tape.reshape(bias, &[d, 1])?;
         let positions = tape.add(positions, bias)?;
         let token = tape.concat(&[weight, positions])?;

@@ -61,14 +61,13 @@ impl Comparison {
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "LRP at long transitions:")?;
-        for (index, (length, [model, untrained, other])) in self.long().enumerate() {
-            let end = if index > 0 { ";" } else { "" };
-            write!(
-                f,
-                "{end} N = {length}: model {model:.2} cm, untrained {untrained:.2} cm, interpolation {other:.2} cm"
-            )?;
-        }
-        Ok(())
+        let lengths = self.long().map(|(length, [model, untrained, other])| {
+            format!(
+                "N = {length}: model {model:.2} cm, untrained {untrained:.2} cm, interpolation \
+                 {other:.2} cm"
+            )
+        });
+        let lengths = lengths.collect::<Vec<_>>().join("; ");
+        write!(f, "LRP at long transitions: {lengths}")
     }
 }

@@ -13,18 +13,14 @@ pub struct Losses {
 impl Losses {
     /// Keeps a step.
     pub fn add(&mut self, report: &StepReport) {
-        let values = [("total", report.total)];
-        let values = values.into_iter().chain(report.losses.iter().copied());
-        for (index, (name, loss)) in values.enumerate() {
+        let total = std::iter::once(("total", report.total));
+        for (index, (name, loss)) in total.chain(report.losses.iter().copied()).enumerate() {
             if index == self.series.len() {
-                self.series.push(LossSeries {
-                    name: name.into(),
-                    points: Vec::new(),
-                });
+                let (name, points) = (name.into(), Vec::new());
+                self.series.push(LossSeries { name, points });
             }
-            self.series[index]
-                .points
-                .push((report.frame_steps as f64, loss));
+            let points = &mut self.series[index].points;
+            points.push((report.frame_steps as f64, loss));
         }
         self.frame_steps = report.frame_steps;
     }
@@ -34,10 +30,8 @@ impl Losses {
     /// # Errors
     /// There is no loss to draw.
     pub fn figure(&self) -> Result<String, FigureError> {
-        let title = format!(
-            "Losses of the demo, {} frame-steps",
-            thousands(self.frame_steps)
-        );
+        let frame_steps = thousands(self.frame_steps);
+        let title = format!("Losses of the demo, {frame_steps} frame-steps");
         loss_curve(&title, &self.series)
     }
 }

@@ -24,21 +24,19 @@ impl DemoSettings {
     pub fn new(reduced: bool, fraction: Option<f64>) -> Result<Self, ReportError> {
         let mut experiment = ExperimentConfig::parse(EXPERIMENT, "experiments/demo.toml")?;
         // 24 clips of half a minute: four of each style.
-        let mut choreography = ChoreographyConfig {
-            clips: 24,
-            frames_per_clip: 900,
-            seed: 1,
-        };
-        if reduced {
-            (choreography.clips, choreography.frames_per_clip) = (12, 450);
-            set_fraction(&mut experiment, 0.1);
+        let (clips, frames_per_clip) = if reduced { (12, 450) } else { (24, 900) };
+        let fraction = fraction.or(reduced.then_some(0.1));
+        if let Some(settings) = TransitionSettings::of_mut(&mut experiment) {
+            let schedule = &mut settings.schedule;
+            schedule.fraction = fraction.unwrap_or(schedule.fraction);
         }
-        if let Some(fraction) = fraction {
-            set_fraction(&mut experiment, fraction);
-            experiment.validate().map_err(ReportError::Fraction)?;
-        }
+        experiment.validate().map_err(ReportError::Fraction)?;
         Ok(Self {
-            choreography,
+            choreography: ChoreographyConfig {
+                clips,
+                frames_per_clip,
+                seed: 1,
+            },
             experiment,
         })
     }
@@ -51,11 +49,5 @@ impl DemoSettings {
         let clips = generate(&self.choreography)?;
         let clips = clips.into_iter().map(|generated| generated.clip).collect();
         Ok(Dataset::from_clips(clips, &self.experiment.data)?)
-    }
-}
-
-fn set_fraction(experiment: &mut ExperimentConfig, fraction: f64) {
-    if let Some(settings) = TransitionSettings::of_mut(experiment) {
-        settings.schedule.fraction = fraction;
     }
 }

@@ -38,17 +38,14 @@ impl<'d> Showcase<'d> {
     /// # Errors
     /// No clip is long enough.
     pub fn new(clips: &'d [DanceClip]) -> Result<Self, ReportError> {
+        let short = || format!("no test clip has the frames of a transition of {LENGTH}");
         let clip = clips.iter().find(|clip| clip.frames() > LENGTH);
-        let clip = clip.ok_or_else(|| {
-            let problem = "no test clip has the frames of a transition of";
-            ReportError::Refused(format!("{problem} {LENGTH}"))
-        })?;
+        let clip = clip.ok_or_else(|| ReportError::Refused(short()))?;
         let start = (clip.frames() - LENGTH - 1) / 2;
         let recorded = window_features(&clip.features, start, LENGTH);
         let request = window_request(&clip.clip, start, recorded.view());
-        let request = request.ok_or_else(|| {
-            ReportError::Refused(format!("{} has fewer poses than frames", clip.name))
-        })?;
+        let fewer = || format!("{} has fewer poses than frames", clip.name);
+        let request = request.ok_or_else(|| ReportError::Refused(fewer()))?;
         Ok(Self {
             clip,
             start,

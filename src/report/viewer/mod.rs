@@ -163,10 +163,7 @@ impl Viewer {
     }
 
     fn check(&self) -> Result<(), FigureError> {
-        let empty = |what| FigureError::Empty {
-            figure: self.title.clone(),
-            what,
-        };
+        let empty = |what| FigureError::empty(&self.title, what);
         if self.motions.is_empty() {
             return Err(empty("no motions"));
         }
@@ -218,10 +215,7 @@ impl Viewer {
     }
 
     fn not_finite(&self, series: &str) -> FigureError {
-        FigureError::NotFinite {
-            figure: self.title.clone(),
-            series: series.into(),
-        }
+        FigureError::not_finite(&self.title, series)
     }
 }
 

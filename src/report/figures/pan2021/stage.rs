@@ -57,21 +57,19 @@ impl<'d> Stage<'d> {
         let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
         let mut fitting: Vec<&DanceClip> = fitting.collect();
         fitting.sort_by(|a, b| a.name.cmp(&b.name));
-        let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
-        let first = match clip {
-            None => 0,
-            Some(name) => fitting
-                .iter()
-                .position(|clip| clip.name == name)
-                .ok_or_else(|| {
-                    let names: Vec<&str> = fitting.iter().map(|clip| clip.name.as_str()).collect();
-                    ReportError::Refused(format!(
-                        "--clip {name} is not among the test clips with {needed} frames or more: {}",
-                        names.join(", ")
-                    ))
-                })?,
-        };
+        let mut first = 0;
+        if let Some(name) = clip {
+            let found = fitting.iter().position(|clip| clip.name == name);
+            first = found.ok_or_else(|| {
+                let names: Vec<&str> = fitting.iter().map(|clip| clip.name.as_str()).collect();
+                ReportError::Refused(format!(
+                    "--clip {name} is not among the test clips with {needed} frames or more: {}",
+                    names.join(", ")
+                ))
+            })?;
+        }
         if fitting.is_empty() {
+            let longest = clips.iter().map(DanceClip::frames).max().unwrap_or(0);
             return Err(ReportError::Refused(format!(
                 "no test clip has the {needed} frames of --length {length} (the longest has {longest})"
             )));
