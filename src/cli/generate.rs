@@ -18,7 +18,7 @@ use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use crate::report::viewer::generated_page;
 use crate::run::{Subject, replace_file, write_json};
 use crate::synthesis::keyframes::Keyframes;
-use crate::synthesis::{Summary, SynthesisOptions, control_warnings, synthesise};
+use crate::synthesis::{ControlWarning, Summary, SynthesisOptions, control_warnings, synthesise};
 use keyframes::KeyframeArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
@@ -71,6 +71,10 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let run = subject.run.as_ref();
     let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
     let ranges = ranges.transpose()?.flatten();
+    let needs = subject.model.needs();
+    let asked = [args.trajectory.asked(), args.velocity.asked()];
+    let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
+    warnings.extend(unread.map(ControlWarning::Unread));
     warnings.extend(control_warnings(&request, ranges.as_ref()));
     for warning in &warnings {
         notice(format_args!("warning: {warning}"));

@@ -5,6 +5,7 @@ use std::fmt;
 use ndarray::ArrayView1;
 
 use super::SequenceRequest;
+use crate::models::Condition;
 use crate::models::transition::DataRanges;
 use crate::motion::{PART_NAMES, PART_WEIGHTS};
 
@@ -46,6 +47,8 @@ pub enum ControlWarning {
         from: usize,
         to: usize,
     },
+    /// Controls that the model does not read.
+    Unread(Condition),
     /// The trajectory misses a keyframe's root, which is moved onto it.
     Moved {
         time: usize,
@@ -110,6 +113,11 @@ impl fmt::Display for ControlWarning {
                 f,
                 "the transition from frame {from} to {to} has {} frames, longer than the paper's longest, {LONGEST}",
                 to - from
+            ),
+            Self::Unread(condition) => write!(
+                f,
+                "the model reads no {}: what is asked for changes nothing between the keyframes",
+                condition.title()
             ),
             Self::Moved { time, distance } => write!(
                 f,

@@ -548,6 +548,22 @@ fn a_control_beyond_the_training_data_is_generated_with_a_warning_that_says_by_h
 }
 
 #[test]
+fn a_control_that_the_model_does_not_read_is_named() {
+    let out = TempDir::new().unwrap();
+    let dance = |model: &str, control: [&str; 2]| {
+        let mut command = three_keyframes(model);
+        command.args(control);
+        command.arg("--out").arg(out.path().join("dance.bvh"));
+        command.assert().success()
+    };
+    dance("interpolation.toml", ["--velocity", "1.1"])
+        .stderr(contains("warning: the model reads no velocity factors"));
+    let read = contains("the model reads no").not();
+    dance("interpolation.toml", ["--raise", "5"]).stderr(read.clone());
+    dance("run", ["--velocity", "1.1"]).stderr(read);
+}
+
+#[test]
 fn the_clips_of_the_choreography_can_be_written_as_files() {
     let out = TempDir::new().unwrap();
     let folder = out.path().join("clips");

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use crate::models::Condition;
 use crate::synthesis::controls::{Points, Speed, read_trajectory};
 use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, SequenceRequest, moved_warnings};
@@ -53,6 +54,13 @@ enum Timing {
 }
 
 impl TrajectoryArgs {
+    /// What these controls ask for between the keyframes, if any is given.
+    pub fn asked(&self) -> Option<Condition> {
+        let given =
+            self.trajectory.is_some() || self.trajectory_through.is_some() || self.raise.is_some();
+        given.then_some(Condition::RootTrajectory)
+    }
+
     /// The request under these controls, and warnings of keyframes that were moved.
     ///
     /// # Errors

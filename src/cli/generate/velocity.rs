@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::models::Condition;
 use crate::synthesis::SequenceRequest;
 use crate::synthesis::controls::{Gains, read_velocity_factors};
 use crate::synthesis::keyframes::Keyframes;
@@ -26,6 +27,13 @@ pub struct VelocityArgs {
 }
 
 impl VelocityArgs {
+    /// What these controls ask for, if any is given.
+    pub fn asked(&self) -> Option<Condition> {
+        let given =
+            self.velocity.is_some() || self.velocity_from.is_some() || self.velocity_csv.is_some();
+        given.then_some(Condition::VelocityFactors)
+    }
+
     /// The request under these controls.
     ///
     /// # Errors

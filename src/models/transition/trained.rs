@@ -167,7 +167,10 @@ impl TransitionModel for TrainedModel {
     }
 
     fn conditions(&self) -> &'static [Condition] {
-        self.network.conditions()
+        match self.refines_velocities {
+            true => &[Condition::RootTrajectory, Condition::VelocityFactors],
+            false => self.network.conditions(),
+        }
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {
