@@ -113,8 +113,5 @@ fn bone_width(joint: usize) -> f64 {
 /// The body part that a joint belongs to.
 fn part_of(joint: usize) -> usize {
     let has_joint = |part: &&[(usize, f64)]| part.iter().any(|&(member, _)| member == joint);
-    PART_WEIGHTS
-        .iter()
-        .position(|part| has_joint(part))
-        .unwrap_or(0)
+    PART_WEIGHTS.iter().position(has_joint).unwrap_or(0)
 }

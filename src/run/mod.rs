@@ -13,7 +13,9 @@ mod subject;
 mod trained_model;
 
 pub use durable::FileError;
-pub(crate) use durable::{remove as remove_file, replace as replace_file, write_json};
+#[cfg(feature = "papers")]
+pub(crate) use durable::remove as remove_file;
+pub(crate) use durable::{replace as replace_file, write_json};
 pub use error::RunError;
 pub use folder::RunFolder;
 pub use log::LogLine;

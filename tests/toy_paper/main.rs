@@ -128,7 +128,7 @@ fn it_is_evaluated_by_its_own_metrics_and_generates_from_a_seed() {
         };
         let motion = subject
             .model
-            .generate(&[request.clone()])
+            .generate(std::slice::from_ref(&request))
             .unwrap()
             .remove(0);
         motion.check(&request).unwrap();
