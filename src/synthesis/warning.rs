@@ -5,7 +5,7 @@ use std::fmt;
 use ndarray::ArrayView1;
 
 use super::SequenceRequest;
-use crate::models::Condition;
+use crate::models::generator::Condition;
 use crate::models::transition::DataRanges;
 use crate::motion::{PART_NAMES, PART_WEIGHTS};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::models::Condition;
+use crate::models::generator::Condition;
 use crate::synthesis::controls::{Points, Speed, read_trajectory};
 use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, SequenceRequest, moved_warnings};

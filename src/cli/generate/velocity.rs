@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::models::Condition;
+use crate::models::generator::Condition;
 use crate::synthesis::SequenceRequest;
 use crate::synthesis::controls::{Gains, read_velocity_factors};
 use crate::synthesis::keyframes::Keyframes;
