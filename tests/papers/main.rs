@@ -21,6 +21,7 @@ mod interpolation;
 mod metrics;
 mod pan2021;
 mod preferred;
+mod prior;
 mod ranges;
 mod root_frame;
 mod schedule;

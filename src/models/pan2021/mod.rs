@@ -22,6 +22,7 @@ mod units;
 
 pub use config::{Controllers, LossWeights, Output, Pan2021Config};
 pub use network::Pan2021;
+pub use prior::Prior;
 
 use crate::models::settings::Paper;
 
