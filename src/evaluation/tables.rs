@@ -16,7 +16,7 @@ pub struct TableRow {
     /// None where it is not trained yet: the row stands there all the same.
     pub scores: Option<Scores>,
     /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6
-    /// frame-steps"; "not trained" for interpolation.
+    /// frame-steps"; "not trained" where nothing is learned.
     pub schedule_note: String,
 }
 

@@ -27,22 +27,8 @@ const STILL: f64 = 1e-9;
 /// Bones below this have no direction, cm.
 const SHORTEST_BONE: f64 = 1e-6;
 
-/// A leg: hip, knee, ankle and toe, and the contact labels of ankle and toe.
-struct Leg {
-    joints: [usize; 4],
-    labels: [usize; 2],
-}
-
-const LEGS: [Leg; 2] = [
-    Leg {
-        joints: [1, 2, 3, 4],
-        labels: [0, 1],
-    },
-    Leg {
-        joints: [5, 6, 7, 8],
-        labels: [2, 3],
-    },
-];
+/// Ankles and toes, in the order of the contact labels.
+const FEET: [[&str; 2]; 2] = [["LeftFoot", "LeftToeBase"], ["RightFoot", "RightToeBase"]];
 
 /// Frames `from..to` in which a joint stands, and the keyframe among them whose place it keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,7 +54,10 @@ pub(super) fn pin_feet(
     contacts: &[[bool; 4]],
     keyframes: &[usize],
 ) {
-    for leg in &LEGS {
+    for (foot, names) in FEET.iter().enumerate() {
+        let Some(leg) = leg(skeleton, names) else {
+            continue;
+        };
         let world = skeleton.world_positions(poses);
         let hold = |joint: usize, label: usize| {
             let on: Vec<bool> = contacts.iter().map(|labels| labels[label]).collect();
@@ -80,21 +69,28 @@ pub(super) fn pin_feet(
                 .collect();
             Hold::new(&stands, &path, keyframes)
         };
-        let ankle = hold(leg.joints[2], leg.labels[0]);
-        let toe = hold(leg.joints[3], leg.labels[1]);
+        let ankle = hold(leg[2], 2 * foot);
+        let toe = hold(leg[3], 2 * foot + 1);
         for (frame, pose) in poses.iter_mut().enumerate() {
             // A toe that stands alone takes the ankle along.
             let moved =
                 ankle.correction[frame] + (1.0 - ankle.weight[frame]) * toe.correction[frame];
             if moved.length() > STILL {
-                move_ankle(skeleton, pose, &leg.joints, moved);
+                move_ankle(skeleton, pose, &leg, moved);
             }
             if toe.weight[frame] > 0.0 && (moved - toe.correction[frame]).length() > STILL {
-                let place = world[frame][leg.joints[3]] + toe.correction[frame];
-                aim_foot(skeleton, pose, &leg.joints, place);
+                let place = world[frame][leg[3]] + toe.correction[frame];
+                aim_foot(skeleton, pose, &leg, place);
             }
         }
     }
+}
+
+/// Hip, knee, ankle and toe of a leg with this ankle and toe, where the skeleton has one.
+fn leg(skeleton: &Skeleton, [ankle, toe]: &[&str; 2]) -> Option<[usize; 4]> {
+    let (ankle, toe) = (skeleton.index_of(ankle)?, skeleton.index_of(toe)?);
+    let knee = skeleton.joints[ankle].parent?;
+    Some([skeleton.joints[knee].parent?, knee, ankle, toe])
 }
 
 /// Runs of frames in contact, short gaps closed and short runs dropped, split between the keyframes

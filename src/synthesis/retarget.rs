@@ -14,7 +14,7 @@ const SAME: f64 = 1e-6;
 const REST: f64 = 0.5;
 /// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis
 /// stands.
-const LEGS: [usize; 4] = [2, 3, 6, 7];
+const LEGS: [&str; 4] = ["LeftLeg", "LeftFoot", "RightLeg", "RightFoot"];
 
 /// The skeleton with the bones that it has in `pose`: where joints move in their parents' frames,
 /// as they stand there.
@@ -79,9 +79,9 @@ pub(super) fn retarget(
         }
     }
     let legs = |skeleton: &Skeleton| -> f64 {
-        LEGS.map(|joint| skeleton.joints[joint].offset.length())
-            .iter()
-            .sum()
+        let joints = skeleton.joints.iter();
+        let bones = joints.filter(|joint| LEGS.contains(&joint.name.as_str()));
+        bones.map(|joint| joint.offset.length()).sum()
     };
     let (theirs, ours) = (legs(from), legs(skeleton));
     if theirs > SAME {
