@@ -349,8 +349,8 @@ impl<T: Real> Rollout<'_, '_, T> {
         tape.concat(&parts)
     }
 
-    /// What a residual is multiplied with in frame t + 1, `[149]`: the deviation of the prior of p^b,
-    /// of p^r and o^r the same; of the velocities that of v^b; 1 for c.
+    /// What a residual is multiplied with in frame t + 1, `[149]`: the deviation that the prior
+    /// leaves p^b, of p^r and o^r the same; of the velocities that of v^b; 1 for c.
     fn residual_deviation(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         tape.constant_with(&[FRAME], |out| {
             out.fill(T::from_f64(self.prior.deviation(t + 1)));
