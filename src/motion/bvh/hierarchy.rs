@@ -57,6 +57,9 @@ pub(super) fn hierarchy(scanner: &mut Scanner) -> Result<(Skeleton, Vec<Vec<Chan
             (Some("CHANNELS"), Kind::Joint) if !block.has_channels && !block.has_children => {
                 hierarchy.channels(scanner)?
             }
+            (Some("CHANNELS"), Kind::EndSite) if !block.has_channels => {
+                hierarchy.no_channels(scanner)?
+            }
             (Some("JOINT"), Kind::Joint) => hierarchy.open_joint(scanner, Some(block.joint))?,
             (Some("END"), Kind::Joint) => hierarchy.open_end_site(scanner, block.joint)?,
             (Some("}"), _) if block.has_offset => {
@@ -101,6 +104,10 @@ impl Hierarchy {
 
     fn open_end_site(&mut self, scanner: &mut Scanner, joint: usize) -> Result<(), BvhError> {
         scanner.keyword("Site")?;
+        // Some programs name it; nothing refers to that name.
+        while scanner.peek_on_line().is_some_and(|word| word != "{") {
+            scanner.word_on_line();
+        }
         scanner.keyword("{")?;
         self.open.push(Block::new(joint, Kind::EndSite));
         Ok(())
@@ -147,6 +154,18 @@ impl Hierarchy {
         if let Some(block) = self.open.last_mut() {
             block.has_channels = true;
             self.channels[block.joint] = channels;
+        }
+        Ok(())
+    }
+
+    /// The `CHANNELS 0` that some programs give an End Site, too.
+    fn no_channels(&mut self, scanner: &mut Scanner) -> Result<(), BvhError> {
+        let word = scanner.word_on_line();
+        if word.and_then(|word| word.parse::<usize>().ok()) != Some(0) {
+            return Err(scanner.error("0 channels in an End Site".into(), shown(word)));
+        }
+        if let Some(block) = self.open.last_mut() {
+            block.has_channels = true;
         }
         Ok(())
     }

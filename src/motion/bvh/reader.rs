@@ -55,7 +55,7 @@ fn text<'a>(bytes: &'a [u8], name: &str) -> Result<&'a str, BvhError> {
         let valid = &bytes[..error.valid_up_to()];
         BvhError::Syntax {
             file: name.into(),
-            line: 1 + valid.iter().filter(|&&byte| byte == b'\n').count(),
+            line: 1 + line_ends(valid),
             expected: "text in UTF-8".into(),
             found: format!(
                 "the byte {:#04x}",
@@ -63,4 +63,10 @@ fn text<'a>(bytes: &'a [u8], name: &str) -> Result<&'a str, BvhError> {
             ),
         }
     })
+}
+
+/// Line ends in a text: LF, CR LF, or CR alone.
+fn line_ends(text: &[u8]) -> usize {
+    let ends = text.iter().filter(|&&byte| byte == b'\n' || byte == b'\r');
+    ends.count() - text.windows(2).filter(|pair| pair == b"\r\n").count()
 }

@@ -1,7 +1,7 @@
 //! The text of a BVH file, word by word and line by line, with the number of the line for errors.
 
 use std::iter::Peekable;
-use std::str::{Lines, SplitWhitespace};
+use std::str::SplitWhitespace;
 
 use super::document::{LARGEST_NUMBER, is_sound};
 use super::error::BvhError;
@@ -11,7 +11,8 @@ const SHOWN: usize = 40;
 
 pub(super) struct Scanner<'a> {
     file: &'a str,
-    lines: Lines<'a>,
+    /// What follows the current line.
+    rest: &'a str,
     words: Peekable<SplitWhitespace<'a>>,
     /// Number of the current line, from 1; 0 before the first.
     line: usize,
@@ -20,10 +21,10 @@ pub(super) struct Scanner<'a> {
 impl<'a> Scanner<'a> {
     /// A scanner before the first line of `text`; `file` names it in errors.
     pub fn new(file: &'a str, text: &'a str) -> Self {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let text = without_end_mark(text.strip_prefix('\u{feff}').unwrap_or(text));
         Self {
             file,
-            lines: text.lines(),
+            rest: text,
             words: "".split_whitespace().peekable(),
             line: 0,
         }
@@ -65,7 +66,11 @@ impl<'a> Scanner<'a> {
     }
 
     fn line_after(&mut self) -> Option<&'a str> {
-        let line = self.lines.next()?;
+        if self.rest.is_empty() {
+            return None;
+        }
+        let (line, rest) = split_line(self.rest);
+        self.rest = rest;
         self.line += 1;
         Some(line)
     }
@@ -108,6 +113,27 @@ impl<'a> Scanner<'a> {
             expected,
             found,
         }
+    }
+}
+
+/// The first line of a text and what follows its end: LF, CR LF, or CR alone as old programs write
+/// it.
+fn split_line(text: &str) -> (&str, &str) {
+    let Some(end) = text.find(['\n', '\r']) else {
+        return (text, "");
+    };
+    let (line, rest) = text.split_at(end);
+    let rest = rest.strip_prefix('\r').unwrap_or(rest);
+    (line, rest.strip_prefix('\n').unwrap_or(rest))
+}
+
+/// A text without the end-of-file mark of DOS, and the zeros that fill up a block after it.
+fn without_end_mark(text: &str) -> &str {
+    let padding = |letter: char| matches!(letter, '\u{1a}' | '\0') || letter.is_whitespace();
+    let cut = text.trim_end_matches(padding);
+    match text[cut.len()..].contains(['\u{1a}', '\0']) {
+        true => cut,
+        false => text,
     }
 }
 

@@ -7,7 +7,12 @@ use glam::DVec3;
 use super::document::Bvh;
 use super::error::BvhError;
 
-/// Writes a document, every number with as many digits as it takes to read the same number back.
+/// Decimals of offsets, positions (cm) and angles (degrees); the step from one to the next is far
+/// below what a recording resolves.
+const DECIMALS: usize = 9;
+
+/// Writes a document: numbers with nine decimals and never an exponent, which some importers
+/// refuse; the frame time with as many digits as it takes to read the same number back.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -34,7 +39,7 @@ impl Bvh {
         text += &format!(
             "MOTION\nFrames: {}\nFrame Time: {}\n",
             self.frames(),
-            number(self.frame_time)
+            self.frame_time
         );
         let first_columns = self.first_columns();
         for row in self.motion.rows() {
@@ -109,11 +114,11 @@ fn vector(vector: DVec3) -> String {
     vector.to_array().map(number).join(" ")
 }
 
-/// The shortest text that reads back as the same number.
 fn number(number: f64) -> String {
-    if number != 0.0 && number.abs() < 1e-7 {
-        format!("{number:e}")
-    } else {
-        format!("{number}")
+    let text = format!("{number:.DECIMALS$}");
+    match text.strip_prefix('-') {
+        // What is rounded to 0 has no sign.
+        Some(digits) if digits.bytes().all(|digit| matches!(digit, b'0' | b'.')) => digits.into(),
+        _ => text,
     }
 }
