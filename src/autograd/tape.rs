@@ -42,6 +42,9 @@ enum Value<T> {
     Released,
 }
 
+/// Name of the values that [`Tape::input`] makes.
+const INPUT: &str = "input";
+
 struct Node<T> {
     name: &'static str,
     value: Value<T>,
@@ -155,7 +158,7 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// A value that is given and wants a gradient of its own, see [`Tape::backward_from`].
     pub fn input(&mut self, value: ArrayD<T>) -> Var {
-        self.leaf("input", value, true)
+        self.leaf(INPUT, value, true)
     }
 
     fn leaf(&mut self, name: &'static str, value: ArrayD<T>, needs_gradient: bool) -> Var {

@@ -3,7 +3,7 @@
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::known::Known;
-use super::{Tape, Value, Var, not_finite};
+use super::{INPUT, Tape, Value, Var, not_finite};
 use crate::autograd::error::AutogradError;
 use crate::autograd::kernels::{Mat, MatMut, Real, product_at, vectorised};
 use crate::autograd::parameters::Gradients;
@@ -28,7 +28,11 @@ impl<T: Real> Tape<'_, T> {
 
     /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's
     /// layout); adds the gradients of the parameters to `gradients` and returns those of `inputs`
-    /// (values made by [`Tape::input`]).
+    /// (values made by [`Tape::input`]), in their order.
+    ///
+    /// # Errors
+    /// An upstream gradient of another length than the output; an input that is no value of
+    /// [`Tape::input`] on this tape; where the tape traces, a gradient that is not finite.
     pub fn backward_from(
         mut self,
         output: Var,
@@ -36,6 +40,25 @@ impl<T: Real> Tape<'_, T> {
         inputs: &[Var],
         gradients: &mut Gradients<T>,
     ) -> Result<Vec<ArrayD<T>>, AutogradError> {
+        let unfit = |shape: &[usize], argument: String, expected| AutogradError::Argument {
+            operation: "backward_from",
+            shape: shape.to_vec(),
+            argument,
+            expected,
+        };
+        let shape = self.shape(output);
+        if upstream.len() != shape.iter().product::<usize>() {
+            let argument = format!("an upstream gradient of {} numbers", upstream.len());
+            return Err(unfit(shape, argument, "one for each number of the output"));
+        }
+        for (place, input) in inputs.iter().enumerate() {
+            let node = self.nodes.get(input.index());
+            if node.is_none_or(|node| node.name != INPUT) {
+                let shape = node.map_or(&[][..], |_| self.shape(*input));
+                let expected = "a value of Tape::input on this tape";
+                return Err(unfit(shape, format!("input {place}"), expected));
+            }
+        }
         let lists = self.workspace.lists();
         let mut slots = std::mem::take(&mut lists.slots);
         slots.resize_with(self.nodes.len(), || None);
@@ -85,14 +108,16 @@ impl<T: Real> Tape<'_, T> {
                 }
                 operation.release(self.workspace);
             }
-            if let Some(k) = inputs.iter().position(|v| v.index() == index) {
+            if inputs.iter().any(|input| input.index() == index) {
                 let shape = self.shape(Var(index as u32)).to_vec();
                 let gradient = slots[index]
                     .take()
                     .unwrap_or_else(|| vec![T::zero(); shape.iter().product()]);
                 let array = ArrayD::from_shape_vec(IxDyn(&shape), gradient)
                     .expect("a gradient has the shape of its value");
-                found.push((k, array));
+                let places = inputs.iter().enumerate();
+                let places = places.filter(|(_, input)| input.index() == index);
+                found.extend(places.map(|(place, _)| (place, array.clone())));
             }
             // Later operations are done and this one too: nothing reads the value any more.
             if index != output.index()

@@ -235,3 +235,41 @@ fn an_overflow_in_the_gradient_of_a_weight_is_traced_to_the_operation_that_made_
         );
     }
 }
+
+/// Gradients of x^4 at x = 3 from its two squarings, of what `pick` takes from x and x^2.
+fn gradients_of(
+    upstream: &[f64],
+    pick: impl Fn(Var, Var) -> Vec<Var>,
+) -> Result<Vec<f64>, AutogradError> {
+    let parameters = Parameters::new();
+    let mut workspace = Workspace::new();
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    let x = tape.input(arr1(&[3.0]).into_dyn());
+    let y = tape.square(x);
+    let z = tape.square(y);
+    let mut sums = Gradients::zeros(&parameters);
+    let found = tape.backward_from(z, upstream, &pick(x, y), &mut sums)?;
+    Ok(found.into_iter().map(|gradient| gradient[[0]]).collect())
+}
+
+#[test]
+fn a_way_back_from_what_does_not_fit_is_refused_and_an_input_asked_for_twice_answered_twice() {
+    assert_eq!(gradients_of(&[1.0], |x, _| vec![x, x]).unwrap(), [108.0; 2]);
+    for upstream in [&[][..], &[1.0, 1.0]] {
+        let error = gradients_of(upstream, |x, _| vec![x])
+            .unwrap_err()
+            .to_string();
+        let numbers = format!("an upstream gradient of {} numbers", upstream.len());
+        assert!(
+            error.contains("backward_from") && error.contains(&numbers),
+            "{error}"
+        );
+    }
+    let error = gradients_of(&[1.0], |x, y| vec![x, y])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("input 1") && error.contains("Tape::input"),
+        "{error}"
+    );
+}
