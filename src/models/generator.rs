@@ -14,7 +14,7 @@ pub struct Given {
     pub frame: i64,
     /// Local translations (cm) and rotations, one for each joint of the skeleton.
     pub pose: Pose,
-    /// What [`crate::motion::features`] measures at this frame of a recording, `[154]` (cm, rad,
+    /// What [`crate::motion::features()`] measures at this frame of a recording, `[154]` (cm, rad,
     /// cm/frame): where the pose was recorded, its facing direction and velocities are known, too.
     pub features: Option<Array1<f64>>,
 }

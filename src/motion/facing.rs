@@ -81,9 +81,9 @@ fn forward(positions: &[DVec3]) -> DVec2 {
     DVec2::new(forward.x, forward.z)
 }
 
-/// Gaussian smoothing over time: the kernel reaches 4 sigma to either side; `before` and `after`
-/// stand beyond the ends.
-fn gaussian(values: &[DVec2], [before, after]: [DVec2; 2], sigma: f64) -> Vec<DVec2> {
+/// Gaussian smoothing over time, `sigma` in frames: the kernel reaches 4 sigma to either side;
+/// `before` and `after` stand beyond the ends.
+pub fn gaussian(values: &[DVec2], [before, after]: [DVec2; 2], sigma: f64) -> Vec<DVec2> {
     let radius = (4.0 * sigma + 0.5) as usize;
     let mut kernel: Vec<f64> = (0..=2 * radius)
         .map(|tap| {
@@ -110,53 +110,10 @@ fn gaussian(values: &[DVec2], [before, after]: [DVec2; 2], sigma: f64) -> Vec<DV
         .collect()
 }
 
-/// Shifts each angle by a multiple of 2 pi so that it is the nearest to the one before.
-fn unwrap(angles: &mut [f64]) {
+/// Shifts each angle (rad) by a multiple of 2 pi so that it is the nearest to the one before.
+pub fn unwrap(angles: &mut [f64]) {
     for time in 1..angles.len() {
         let turns = ((angles[time] - angles[time - 1]) / TAU).round();
         angles[time] -= turns * TAU;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn smoothing_agrees_with_scipy() {
-        // scipy.ndimage.gaussian_filter1d([0, 0, 1, 5, -2], 1.5, mode="nearest"), likewise [3, -1,
-        // 0, 0, 7]
-        let expected_x = [0.27188328, 0.67025507, 1.02270121, 0.80875307, -0.09178544];
-        let expected_z = [1.7469826, 1.14805353, 1.3275359, 2.59391143, 4.42102501];
-        let values =
-            [[0.0, 3.0], [0.0, -1.0], [1.0, 0.0], [5.0, 0.0], [-2.0, 7.0]].map(DVec2::from_array);
-        let smoothed = gaussian(&values, [values[0], values[4]], 1.5);
-        for (time, smooth) in smoothed.into_iter().enumerate() {
-            assert!(
-                smooth.distance(DVec2::new(expected_x[time], expected_z[time])) < 1e-7,
-                "{time}: {smooth}"
-            );
-        }
-    }
-
-    #[test]
-    fn unwrapped_angles_take_the_short_way() {
-        let mut angles = vec![3.0, -3.0, 0.0, 3.0, -3.0, -0.5];
-        unwrap(&mut angles);
-        let expected = [
-            3.0,
-            TAU - 3.0,
-            TAU,
-            TAU + 3.0,
-            2.0 * TAU - 3.0,
-            2.0 * TAU - 0.5,
-        ];
-        assert!(
-            angles
-                .iter()
-                .zip(expected)
-                .all(|(found, expected)| (found - expected).abs() < 1e-12),
-            "{angles:?}"
-        );
     }
 }

@@ -5,7 +5,7 @@
 //! | SHA-256 of all before
 //! ```
 //!
-//! The random streams need nothing saved, see [`super::Streams`].
+//! The random streams need nothing saved, see [`crate::models::streams::Streams`].
 
 use std::path::Path;
 

@@ -36,10 +36,8 @@ pub struct Excess {
 pub enum ControlWarning {
     RootSpeed(Excess),
     RootHeight(Excess),
-    VelocityFactor {
-        part: usize,
-        excess: Excess,
-    },
+    /// Of a part of the body.
+    VelocityFactor(usize, Excess),
     /// The trunk's velocity factor counts the root, so the trajectory alone makes it at least the
     /// bound.
     Contradiction(Excess),
@@ -83,16 +81,15 @@ impl fmt::Display for ControlWarning {
                 if asked > bound { "above" } else { "below" },
                 if asked > bound { "highest" } else { "lowest" },
             ),
-            Self::VelocityFactor {
+            Self::VelocityFactor(
                 part,
-                excess:
-                    Excess {
-                        frame,
-                        asked,
-                        bound,
-                        frames,
-                    },
-            } => write!(
+                Excess {
+                    frame,
+                    asked,
+                    bound,
+                    frames,
+                },
+            ) => write!(
                 f,
                 "the velocity factor of {} is {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's highest ({bound:.1} in 99.9 % of \
                  its frames); too high in {frames} frames",
@@ -168,7 +165,7 @@ pub fn control_warnings(
     for (part, &bound) in ranges.velocity_factors.iter().enumerate() {
         let factors = request.velocity_factors.column(part);
         let excess = beyond(factors.iter().copied(), bound);
-        warnings.extend(excess.map(|excess| ControlWarning::VelocityFactor { part, excess }));
+        warnings.extend(excess.map(|excess| ControlWarning::VelocityFactor(part, excess)));
     }
     warnings
 }

@@ -15,6 +15,7 @@ mod bvh;
 mod choreography;
 mod contact;
 mod dataset;
+mod facing;
 mod features;
 mod fit;
 mod ik;

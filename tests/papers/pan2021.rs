@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
-use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config};
+use keydance::models::pan2021::{Controllers, LossWeights, Pan2021Config, keyframe_weights};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
@@ -739,5 +739,18 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
     for (change, words) in cases {
         let text = refusal(change);
         assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn keyframe_weights_pull_to_the_nearer_keyframe_and_sum_to_one() {
+    for (n, m) in [(3, 5), (10, 5), (11, 5), (50, 5)] {
+        let all: Vec<_> = (1..=n).map(|t| keyframe_weights(t, n, m)).collect();
+        let sum: f64 = all.iter().map(|(a, b)| a + b).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "N = {n}");
+        assert!(
+            all[n - 1].1 > all[n - 1].0,
+            "N = {n}: the last frame belongs to k2"
+        );
     }
 }

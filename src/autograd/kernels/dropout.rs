@@ -40,7 +40,7 @@ impl Dropout {
     }
 }
 
-/// `out[i] = x[i] * mask[i] / (1 - p)` with the mask of stream `key` (as [`Dropout`] makes it).
+/// `out[i] = x[i] * mask[i] / (1 - p)` with the mask of stream `key` (as Dropout makes it).
 ///
 /// # Panics
 /// When the lengths differ or exceed 2^32.

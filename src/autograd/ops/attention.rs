@@ -1,5 +1,5 @@
 //! Multi-head attention over many small windows, as one kernel; also the record of
-//! [`super::shared_attention`].
+//! `shared_attention`.
 //!
 //! ```text
 //! Q, K, V are columns of values with the windows' tokens as rows: q rows [windows * tq],

@@ -36,8 +36,8 @@
 //! The network always trains on its own predictions, as in that paper: scheduled sampling draws
 //! without effect. Without noise, which acts in training only, a prediction is deterministic. Root
 //! trajectory and velocity factors are not read. Predicted poses become the 149 numbers of a frame
-//! by forward kinematics; [`super::Transition`]s hold what LRP compares, so the facing angle
-//! matters: see `posed_frames`.
+//! by forward kinematics; a [`crate::models::transition::Transition`] holds what LRP compares, so
+//! the facing angle matters: see `posed_frames`.
 //!
 //! Parameters: `state_encoder`, `offset_encoder`, `target_encoder`, `initial_state`, `decoder`
 //! (`.0`, `.2`, `.4` as in a `torch.nn.Sequential`), `lstm`, `critics.short`, `critics.long`.

@@ -202,7 +202,7 @@ fn root_smoothness<T: Real>(tape: &mut Tape<'_, T>, frames: &Frames) -> Result<V
 ///
 /// In the second case (N <= 2m) the printed weights pull frames near k2 towards k1; the ones here
 /// pull to the nearer keyframe.
-fn keyframe_weights(t: usize, transition: usize, m: usize) -> (f64, f64) {
+pub fn keyframe_weights(t: usize, transition: usize, m: usize) -> (f64, f64) {
     let n = transition as f64;
     if transition > 2 * m {
         let each = 1.0 / (2 * m) as f64;
@@ -261,22 +261,4 @@ fn velocity_factor<T: Real>(
     let wanted = truth(tape, batch, VELOCITY_FACTORS);
     let difference = tape.sub(factors, wanted)?;
     Ok(sum_of_squares(tape, difference))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::keyframe_weights;
-
-    #[test]
-    fn keyframe_weights_pull_to_the_nearer_keyframe_and_sum_to_one() {
-        for (n, m) in [(3, 5), (10, 5), (11, 5), (50, 5)] {
-            let all: Vec<_> = (1..=n).map(|t| keyframe_weights(t, n, m)).collect();
-            let sum: f64 = all.iter().map(|(a, b)| a + b).sum();
-            assert!((sum - 1.0).abs() < 1e-12, "N = {n}");
-            assert!(
-                all[n - 1].1 > all[n - 1].0,
-                "N = {n}: the last frame belongs to k2"
-            );
-        }
-    }
 }

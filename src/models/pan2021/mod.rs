@@ -21,6 +21,7 @@ mod prior;
 mod units;
 
 pub use config::{Controllers, LossWeights, Output, Pan2021Config};
+pub use losses::keyframe_weights;
 pub use network::Pan2021;
 pub use prior::Prior;
 

@@ -145,8 +145,8 @@ pub fn generated_batch(
 }
 
 /// Compares the gradient of a model's total loss with central differences: for critics of their own
-/// part of it, for all other weights of the rest (see [`super::LossTerms::critics`]). None where
-/// the model is never fed as the case says.
+/// part of it, for all other weights of the rest (see [`crate::models::LossTerms::critics`]). None
+/// where the model is never fed as the case says.
 ///
 /// # Errors
 /// A model that is not trained, or whose settings do not fit together; nothing to check it on.
