@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::motion::FeatureConfig;
+use crate::motion::{FeatureConfig, Unit, Up};
 
 /// How clips are read, measured and split.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,24 @@ pub struct DataConfig {
     /// Mapping file for clips on another skeleton than the dance skeleton.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mapping: Option<PathBuf>,
+    /// Unit of the files' lengths: "cm", "m", "mm", "in"; "auto" recognises it by the body's height.
+    #[serde(skip_serializing_if = "is_default")]
+    pub unit: Unit,
+    /// Axis that points up in the files: "y", "z"; "auto" recognises it by how the body stands.
+    #[serde(skip_serializing_if = "is_default")]
+    pub up: Up,
+    /// Frames a second of the files, whatever their headers say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source_fps: Option<f64>,
+    /// Frames that are left out at the beginning of every file of a data folder, such as a T-pose;
+    /// counted at the file's own rate.
+    #[serde(skip_serializing_if = "is_default")]
+    pub skip_frames: usize,
+}
+
+/// Keys that keep their defaults are left out of a run's config, so that older versions read it.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl Default for DataConfig {
@@ -38,6 +56,10 @@ impl Default for DataConfig {
             split: Split::Dance,
             validation_share: 0.0,
             mapping: None,
+            unit: Unit::Auto,
+            up: Up::Auto,
+            source_fps: None,
+            skip_frames: 0,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A folder of BVH files as training, validation and test clips.
+//! Recordings as training, validation and test clips.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,7 +9,10 @@ use sha2::{Digest, Sha256};
 use thiserror::Error;
 
 use super::config::DataConfig;
+use super::folder::{clip_files, left_out};
+use super::reading::{FileReading, grouped};
 use super::split::{Parts, check_dance_frames, split};
+use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
 
@@ -31,6 +34,8 @@ pub struct Dataset {
     /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over
     /// names and poses.
     pub digest: String,
+    /// What is odd about the files, or was changed in reading them; no error.
+    pub warnings: Vec<String>,
 }
 
 /// Why a folder is not a data set.
@@ -47,6 +52,14 @@ pub enum DataError {
          https://github.com/wslh852/Keyframe-based-Complex-Motion-Synthesis (they come from DanceDB, http://dancedb.eu)"
     )]
     NoClips { folder: PathBuf },
+    #[error(
+        "the data folder {folder} holds no .bvh file itself; {clips} lie deeper, the first is {first}: give their folder, or put the files into one"
+    )]
+    ClipsBelow {
+        folder: PathBuf,
+        clips: usize,
+        first: PathBuf,
+    },
     #[error("{path} cannot be read")]
     File {
         path: PathBuf,
@@ -63,6 +76,18 @@ pub enum DataError {
     },
     #[error("two clips are called {name}; clips are split by their names, so give each its own")]
     SameName { name: String },
+    #[error(
+        "{train} and {test} are the same motion, one to train on and one to test on; take one of them away"
+    )]
+    SameMotion { train: String, test: String },
+    #[error(
+        "data.{key} = {value} and the mapping file {file} declares it, too; keep one of the two"
+    )]
+    DeclaredTwice {
+        key: &'static str,
+        value: String,
+        file: String,
+    },
     #[error("data.{key} = {value}: expected {expected}")]
     Config {
         key: &'static str,
@@ -80,7 +105,7 @@ pub enum DataError {
 }
 
 impl Recording {
-    /// A clip brought to the config's rate and, where there is a mapping, onto its skeleton.
+    /// A clip in cm with Y up, brought to the config's rate and, where there is a mapping, onto its skeleton.
     ///
     /// # Errors
     /// The clip cannot be resampled or mapped.
@@ -114,11 +139,15 @@ impl Dataset {
     /// # Errors
     /// The folder has no BVH file, a file is bad, or the config does not fit what is there.
     pub fn load(folder: &Path, config: &DataConfig) -> Result<Self, DataError> {
-        let names = clip_names(folder)?;
+        let files = clip_files(folder)?;
+        let names: Vec<String> = files.keys().cloned().collect();
         let origin = format!("the data folder {}", folder.display());
-        Self::assemble(&names, &origin, config, |name, mapping| {
-            read_clip(folder, name, mapping, config)
-        })
+        let mut dataset = Self::assemble(&names, &origin, config, |name, mapping| {
+            read_clip(&files[name], name, mapping, config)
+        })?;
+        dataset.warnings.extend(twins(&dataset)?);
+        dataset.warnings.extend(left_out(folder));
+        Ok(dataset)
     }
 
     /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as
@@ -137,8 +166,11 @@ impl Dataset {
         let names: Vec<String> = by_name.keys().cloned().collect();
         Self::assemble(&names, "the set of clips", config, |name, mapping| {
             let clip = &by_name[name];
-            let measured = Recording::new(clip.clone(), mapping, config)?;
-            Ok((measured, pose_digest(clip)))
+            Ok(ReadClip {
+                recording: Recording::new(clip.clone(), mapping, config)?,
+                digest: pose_digest(clip),
+                notices: Vec::new(),
+            })
         })
     }
 
@@ -148,11 +180,11 @@ impl Dataset {
         names: &[String],
         origin: &str,
         config: &DataConfig,
-        read: impl Fn(&String, Option<&Mapping>) -> Result<(Recording, String), DataError> + Sync,
+        read: impl Fn(&String, Option<&Mapping>) -> Result<ReadClip, DataError> + Sync,
     ) -> Result<Self, DataError> {
         let parts = split(names, origin, config)?;
         let mapping = config.mapping.as_deref().map(Mapping::read).transpose()?;
-        let read = |names: &Vec<String>| -> Result<Vec<(Recording, String)>, DataError> {
+        let read = |names: &Vec<String>| -> Result<Vec<ReadClip>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
                 .map(|name| read(name, mapping.as_ref()))
@@ -165,68 +197,49 @@ impl Dataset {
             test,
         } = &parts;
         let (train, validation, test) = (read(train)?, read(validation)?, read(test)?);
-        let digest = digest(train.iter().chain(&validation).chain(&test));
-        let clips =
-            |part: Vec<(Recording, String)>| part.into_iter().map(|(clip, _)| clip).collect();
+        let all = || train.iter().chain(&validation).chain(&test);
+        let digest = digest(all());
+        let warnings = grouped(all().map(|clip| (clip.recording.name(), &clip.notices[..])));
+        let clips = |part: Vec<ReadClip>| part.into_iter().map(|clip| clip.recording).collect();
         let dataset = Self {
             train: clips(train),
             validation: clips(validation),
             test: clips(test),
             digest,
+            warnings,
         };
         check_dance_frames(&dataset, origin, config)?;
         Ok(dataset)
     }
 }
 
-/// Names of the BVH files in a folder, sorted bytewise.
-fn clip_names(folder: &Path) -> Result<Vec<String>, DataError> {
-    let unreadable = |source| DataError::Folder {
-        folder: folder.into(),
-        source,
-    };
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let name = entry
-            .map_err(unreadable)?
-            .file_name()
-            .to_string_lossy()
-            .into_owned();
-        let is_bvh = Path::new(&name)
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("bvh"));
-        if is_bvh && !name.starts_with('.') {
-            names.push(name);
-        }
-    }
-    names.sort_unstable();
-    if names.is_empty() {
-        Err(DataError::NoClips {
-            folder: folder.into(),
-        })
-    } else {
-        Ok(names)
-    }
+/// A clip that was read.
+struct ReadClip {
+    recording: Recording,
+    /// SHA-256 of what it was made from, hexadecimal.
+    digest: String,
+    notices: Vec<String>,
 }
 
-/// A clip and the SHA-256 of its file.
+/// Reads a file; `name` is the clip's.
 fn read_clip(
-    folder: &Path,
+    path: &Path,
     name: &str,
     mapping: Option<&Mapping>,
     config: &DataConfig,
-) -> Result<(Recording, String), DataError> {
-    let path = folder.join(name);
-    let bytes = std::fs::read(&path).map_err(|source| DataError::File {
-        path: path.clone(),
+) -> Result<ReadClip, DataError> {
+    let bytes = std::fs::read(path).map_err(|source| DataError::File {
+        path: path.into(),
         source,
     })?;
     let mut clip = bvh::parse(&bytes, &path.display().to_string())?.to_clip();
     clip.name = name.into();
-    Ok((
-        Recording::new(clip, mapping, config)?,
-        hexadecimal(&Sha256::digest(&bytes)),
-    ))
+    let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
+    Ok(ReadClip {
+        recording,
+        digest: hexadecimal(&Sha256::digest(&bytes)),
+        notices,
+    })
 }
 
 /// SHA-256 over rate and poses, hexadecimal.
@@ -243,9 +256,9 @@ fn pose_digest(clip: &Clip) -> String {
     hexadecimal(&hash.finalize())
 }
 
-fn digest<'a>(clips: impl Iterator<Item = &'a (Recording, String)>) -> String {
+fn digest<'a>(clips: impl Iterator<Item = &'a ReadClip>) -> String {
     let mut lines: Vec<(&str, &str)> = clips
-        .map(|(clip, digest)| (clip.name(), digest.as_str()))
+        .map(|clip| (clip.recording.name(), clip.digest.as_str()))
         .collect();
     lines.sort_unstable();
     let list: String = lines

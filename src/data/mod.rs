@@ -3,10 +3,14 @@
 pub mod choreography;
 pub mod config;
 pub mod dataset;
+mod folder;
 mod part;
+mod reading;
 mod split;
+mod twins;
 
 pub use config::{DataConfig, Split};
 pub(crate) use dataset::hexadecimal;
 pub use dataset::{DataError, Dataset, Recording};
 pub use part::{DataPart, EmptyPart};
+pub use reading::FileReading;

@@ -1,7 +1,8 @@
 //! Mapping files: which joints of another skeleton stand for the 24 of the dance skeleton.
 //!
 //! ```toml
-//! scale = 2.54                                            # cm per unit; 1 where left out
+//! scale = 2.54                                            # cm per unit; or unit = "in"
+//! up = "z"                                                # or "y"; recognised where left out
 //! [joints]
 //! Hips = "hip"                                            # a joint
 //! LeftToeBase = "lFoot/End Site"                          # an End Site, or "lFoot/End Site 2"
@@ -17,6 +18,7 @@ use thiserror::Error;
 
 use super::clip::{Clip, Pose};
 use super::skeleton::{DANCE_JOINTS, DANCE_PARENTS, Joint, Skeleton};
+use super::units::{Unit, Up, turn_z_up};
 
 /// Why a mapping cannot be used.
 #[derive(Debug, Error)]
@@ -44,6 +46,8 @@ pub enum MappingError {
         value: f64,
         expected: &'static str,
     },
+    #[error("{file} gives both scale and unit; keep one")]
+    ScaleAndUnit { file: String },
     #[error(
         "{file}: {joint} is mapped to {source_name:?}, which {clip} does not have ({available})"
     )]
@@ -61,8 +65,11 @@ pub enum MappingError {
 pub struct Mapping {
     /// Name of the file, for errors.
     file: String,
-    /// cm per unit of the other skeleton.
+    /// cm per unit of the other skeleton; 1 where the file does not say.
     scale: f64,
+    /// Whether the file says it.
+    has_unit: bool,
+    up: Up,
     /// In the order of the dance skeleton, `[24]`.
     sources: Vec<Source>,
 }
@@ -70,13 +77,12 @@ pub struct Mapping {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MappingFile {
-    #[serde(default = "one")]
-    scale: f64,
+    scale: Option<f64>,
+    #[serde(default)]
+    unit: Unit,
+    #[serde(default)]
+    up: Up,
     joints: BTreeMap<String, Source>,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 /// What stands for a joint.
@@ -134,7 +140,17 @@ impl Mapping {
             file: file.into(),
             source: Box::new(source),
         })?;
-        let MappingFile { scale, mut joints } = parsed;
+        let MappingFile {
+            scale,
+            unit,
+            up,
+            mut joints,
+        } = parsed;
+        if scale.is_some() && unit != Unit::Auto {
+            return Err(MappingError::ScaleAndUnit { file: file.into() });
+        }
+        let has_unit = scale.is_some() || unit != Unit::Auto;
+        let scale = scale.unwrap_or(unit.cm());
         let fault = |key: String, value: f64, expected| MappingError::Value {
             file: file.into(),
             key,
@@ -173,11 +189,28 @@ impl Mapping {
         Ok(Self {
             file: file.into(),
             scale,
+            has_unit,
+            up,
             sources: found.into_iter().flatten().collect(),
         })
     }
 
-    /// The clip on the dance skeleton, in cm.
+    /// Whether the file declares the clips' unit, by `scale` or `unit`.
+    pub fn has_unit(&self) -> bool {
+        self.has_unit
+    }
+
+    /// Whether the file declares the clips' upward axis.
+    pub fn has_up(&self) -> bool {
+        self.up != Up::Auto
+    }
+
+    /// Name of the file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The clip on the dance skeleton, in cm and with Y up where the file declares unit and axis.
     ///
     /// Every joint has the world position and world rotation of what stands for it, in every frame;
     /// so a point between two joints moves in its parent's frame, and the skeleton's offsets are
@@ -206,7 +239,7 @@ impl Mapping {
                 end_sites: self.end_sites(index, &places[index], &clip.skeleton),
             })
             .collect();
-        Ok(Clip {
+        let mut mapped = Clip {
             name: clip.name.clone(),
             skeleton: Skeleton { joints },
             frame_time: clip.frame_time,
@@ -215,7 +248,11 @@ impl Mapping {
                 .iter()
                 .map(|pose| self.pose(&places, pose, &clip.skeleton))
                 .collect(),
-        })
+        };
+        if self.up == Up::Z {
+            turn_z_up(&mut mapped);
+        }
+        Ok(mapped)
     }
 
     fn place(&self, source: &Source, joint: &str, clip: &Clip) -> Result<Place, MappingError> {

@@ -9,14 +9,17 @@ pub mod contact;
 pub mod facing;
 pub mod features;
 pub mod fit;
+pub mod frame_rate;
 pub mod ik;
 pub mod mapping;
 pub mod mirror;
+pub mod oddities;
 pub mod placement;
 pub mod resample;
 pub mod rotation_fit;
 pub mod skeleton;
 pub mod tempo;
+pub mod units;
 pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
@@ -26,6 +29,7 @@ pub use mirror::mirror_image;
 pub use resample::{ResampleError, resample};
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
 pub use tempo::at_tempo;
+pub use units::{Measured, Unit, Up};
 pub use velocity_factor::{
     PART_NAMES, PART_WEIGHTS, PARTS, measured_velocity_factors, velocity_factors,
     velocity_factors_between,

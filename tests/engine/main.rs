@@ -26,4 +26,5 @@ mod rotation_fit;
 mod run_state;
 mod split;
 mod streams;
+mod units;
 mod velocity_factor;

@@ -130,6 +130,7 @@ pub fn dataset() -> Dataset {
         validation: Vec::new(),
         test,
         digest: "synthetic".into(),
+        warnings: Vec::new(),
     }
 }
 

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::data::{DataConfig, DataError, Recording};
+use crate::data::{DataConfig, DataError, FileReading, Recording};
 use crate::motion::{Clip, FeatureConfig, FeatureError, Mapping, at_tempo, features, mirror_image};
 
 /// A clip on the dance skeleton, with its features.
@@ -18,7 +18,7 @@ pub struct DanceClip {
 }
 
 impl DanceClip {
-    /// A clip brought to the config's rate, put on the dance skeleton by `mapping` where there is
+    /// A clip in cm with Y up, brought to the config's rate, put on the dance skeleton by `mapping` where there is
     /// one, and measured.
     ///
     /// # Errors
@@ -30,6 +30,24 @@ impl DanceClip {
     ) -> Result<Self, DataError> {
         let Recording { clip } = Recording::new(clip, mapping, config)?;
         Ok(Self::measure(clip, &config.features())?)
+    }
+
+    /// A clip as a file has it, in whatever unit and axis, brought to the config's rate and onto
+    /// the dance skeleton and measured; and what is to be said of the file,
+    /// by its name, see [`FileReading`].
+    ///
+    /// # Errors
+    /// As [`FileReading::of`], or it cannot be measured.
+    pub fn from_file(
+        clip: Clip,
+        mapping: Option<&Mapping>,
+        config: &DataConfig,
+    ) -> Result<(Self, Vec<String>), DataError> {
+        let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
+        let measured = Self::measure(recording.clip, &config.features())?;
+        let named = |notice| format!("{}: {notice}", measured.name);
+        let notices = notices.into_iter().map(named).collect();
+        Ok((measured, notices))
     }
 
     /// A clip on the dance skeleton, measured.

@@ -2,23 +2,58 @@
 
 use std::fmt;
 
-use super::Bvh;
+use super::{Axis, Bvh};
+use crate::motion::frame_rate::meant_rate;
+use crate::motion::{Measured, Unit, Up};
 
-/// A document whose `Display` says its frames, rate, duration, channels, the range of root heights,
-/// and its hierarchy.
-pub struct Inspection<'a>(pub &'a Bvh);
+/// A document whose `Display` says its frames, rate, duration, channels, unit and upward axis, the
+/// range of root heights, and its hierarchy; lengths in the file's own unit.
+pub struct Inspection<'a> {
+    pub document: &'a Bvh,
+    /// The unit that is declared, or else recognised.
+    pub unit: Unit,
+    /// Likewise the axis.
+    pub up: Up,
+}
+
+impl Inspection<'_> {
+    fn unit(&self, measured: &Measured) -> String {
+        let tall = measured.height.map_or_else(
+            || "no head and feet by name".into(),
+            |height| format!("the body is {height:.3} tall"),
+        );
+        match (self.unit, measured.unit) {
+            (Unit::Auto, Some(unit)) => format!("{unit}, as {tall}"),
+            (Unit::Auto, None) => format!("not recognised, taken as cm ({tall})"),
+            (declared, _) => format!("{declared}, as declared ({tall})"),
+        }
+    }
+
+    fn axis(&self, measured: &Measured) -> (Axis, &'static str) {
+        match (self.up, measured.up) {
+            (Up::Z, _) => (Axis::Z, "Z, as declared"),
+            (Up::Y, _) => (Axis::Y, "Y, as declared"),
+            (Up::Auto, Some(Up::Z)) => (Axis::Z, "Z, as the body stands"),
+            (Up::Auto, Some(_)) => (Axis::Y, "Y, as the body stands"),
+            (Up::Auto, None) => (Axis::Y, "not recognised, taken as Y"),
+        }
+    }
+}
 
 impl fmt::Display for Inspection<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let document = self.0;
+        let document = self.document;
         let joints = &document.skeleton().joints;
         let ends: usize = joints.iter().map(|joint| joint.end_sites.len()).sum();
         let (frames, frame_time) = (document.frames(), document.frame_time());
-        let heights = document
-            .to_clip()
+        let clip = document.to_clip();
+        let measured = Measured::of(&clip);
+        let (axis, up) = self.axis(&measured);
+        let heights = clip
             .poses
-            .into_iter()
-            .filter_map(|pose| pose.translations.first().map(|root| root.y));
+            .iter()
+            .filter_map(|pose| pose.translations.first())
+            .map(|root| root[axis.index()]);
         let (lowest, highest) = heights
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
                 (low.min(y), high.max(y))
@@ -27,12 +62,15 @@ impl fmt::Display for Inspection<'_> {
         writeln!(f, "frames       {frames}")?;
         writeln!(
             f,
-            "frame time   {frame_time} s ({:.3} fps)",
-            1.0 / frame_time
+            "frame time   {frame_time} s ({:.3} fps{})",
+            1.0 / frame_time,
+            meant_rate(frame_time).map_or_else(String::new, |fps| format!(", taken as {fps:.3}"))
         )?;
         writeln!(f, "duration     {:.3} s", frames as f64 * frame_time)?;
         writeln!(f, "joints       {} and {ends} End Sites", joints.len())?;
         writeln!(f, "channels     {}", document.motion().ncols())?;
+        writeln!(f, "unit         {}", self.unit(&measured))?;
+        writeln!(f, "up           {up}")?;
         writeln!(f, "root height  {lowest:.3} to {highest:.3}")?;
         writeln!(f, "hierarchy")?;
         let mut depths: Vec<usize> = Vec::with_capacity(joints.len());

@@ -1,0 +1,133 @@
+//! From a file's clip to a recording: rate, first frames, skeleton, unit and axis, once, where the
+//! file is read.
+
+use super::config::DataConfig;
+use super::dataset::{DataError, Recording};
+use crate::motion::frame_rate::meant_rate;
+use crate::motion::oddities::oddities;
+use crate::motion::units::to_cm_and_y_up;
+use crate::motion::{Clip, Mapping, Unit, Up};
+
+/// How many clips a warning names.
+const NAMED: usize = 3;
+
+/// A recording as it was read from a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileReading {
+    /// In cm, with Y up, at the config's rate.
+    pub recording: Recording,
+    /// What is odd about the file, and what of it was recognised and converted, a sentence each.
+    pub notices: Vec<String>,
+}
+
+impl FileReading {
+    /// A clip as its file has it, in the unit and axis and at the rate that the config declares or
+    /// that are recognised; on the dance skeleton where there is a mapping.
+    ///
+    /// # Errors
+    /// The clip cannot be resampled or mapped, has too few frames, or the config declares what the
+    /// mapping declares otherwise.
+    pub fn of(
+        mut clip: Clip,
+        mapping: Option<&Mapping>,
+        config: &DataConfig,
+    ) -> Result<Self, DataError> {
+        let mut notices = Vec::new();
+        notices.extend(set_rate(&mut clip, config.source_fps)?);
+        skip_frames(&mut clip, config.skip_frames)?;
+        notices.extend(oddities(&clip));
+        let Recording { mut clip } = Recording::new(clip, mapping, config)?;
+        // What the mapping declares has been applied with it.
+        let (unit, up) = match mapping {
+            Some(mapping) => undeclared(mapping, config)?,
+            None => (config.unit, config.up),
+        };
+        notices.extend(to_cm_and_y_up(&mut clip, unit, up));
+        Ok(Self {
+            recording: Recording { clip },
+            notices,
+        })
+    }
+}
+
+/// Gives a clip the declared rate, or the one that its frame time rounds.
+fn set_rate(clip: &mut Clip, declared: Option<f64>) -> Result<Option<String>, DataError> {
+    if let Some(fps) = declared {
+        if !(fps.is_finite() && fps > 0.0) {
+            return Err(DataError::Config {
+                key: "source_fps",
+                value: fps.to_string(),
+                expected: "a positive number of frames a second",
+            });
+        }
+        clip.frame_time = 1.0 / fps;
+        return Ok(None);
+    }
+    let Some(fps) = meant_rate(clip.frame_time) else {
+        return Ok(None);
+    };
+    let said = clip.frame_time;
+    clip.frame_time = 1.0 / fps;
+    Ok(Some(format!(
+        "the frame time of {said} s is taken for {} frames a second, rounded; data.source_fps in a config gives another rate",
+        (fps * 1000.0).round() / 1000.0
+    )))
+}
+
+fn skip_frames(clip: &mut Clip, frames: usize) -> Result<(), DataError> {
+    if frames > 0 && frames >= clip.poses.len() {
+        return Err(DataError::Config {
+            key: "skip_frames",
+            value: format!(
+                "{frames}, but {} has {} frames",
+                clip.name,
+                clip.poses.len()
+            ),
+            expected: "fewer frames than any clip has",
+        });
+    }
+    clip.poses.drain(..frames);
+    Ok(())
+}
+
+/// What a mapping leaves to the config to declare.
+fn undeclared(mapping: &Mapping, config: &DataConfig) -> Result<(Unit, Up), DataError> {
+    let twice = |key, value: String| DataError::DeclaredTwice {
+        key,
+        value,
+        file: mapping.file().into(),
+    };
+    let unit = match (mapping.has_unit(), config.unit) {
+        (false, unit) => unit,
+        (true, Unit::Auto) => Unit::Cm,
+        (true, unit) => return Err(twice("unit", unit.to_string())),
+    };
+    let up = match (mapping.has_up(), config.up) {
+        (false, up) => up,
+        (true, Up::Auto) => Up::Y,
+        (true, up) => return Err(twice("up", up.to_string())),
+    };
+    Ok((unit, up))
+}
+
+/// The notices of several clips, one that several have said once.
+pub(super) fn grouped<'a>(clips: impl Iterator<Item = (&'a str, &'a [String])>) -> Vec<String> {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, notices) in clips {
+        for notice in notices {
+            match groups.iter_mut().find(|(known, _)| known == notice) {
+                Some((_, names)) => names.push(name),
+                None => groups.push((notice, vec![name])),
+            }
+        }
+    }
+    let said = |(notice, names): (&str, Vec<&str>)| match names.len() {
+        few if few <= NAMED => format!("{}: {notice}", names.join(", ")),
+        many => format!(
+            "{} and {} other clips: {notice}",
+            names[..NAMED].join(", "),
+            many - NAMED
+        ),
+    };
+    groups.into_iter().map(said).collect()
+}

@@ -1,0 +1,90 @@
+//! What a recording has that its dancer did not do.
+
+use glam::DVec3;
+
+use super::clip::Clip;
+
+/// A step at the beginning is a jump where its fastest joint goes this many times as far as any
+/// joint in any step after it.
+const JUMP: f64 = 2.5;
+/// And at least this share of the body's extent: further than a fist goes in a frame.
+const LEAST_JUMP: f64 = 0.15;
+/// How long a beginning lasts, s, and the share of a clip that it is at most.
+const BEGINNING: f64 = 1.0;
+const BEGINNING_SHARE: f64 = 0.25;
+/// How many joints a notice names.
+const NAMED: usize = 3;
+
+/// What is odd about a clip as it was read, each in a sentence.
+pub fn oddities(clip: &Clip) -> Vec<String> {
+    collapsed_joints(clip)
+        .into_iter()
+        .chain(jump_at_the_beginning(clip))
+        .collect()
+}
+
+/// Joints that stand on their parents in every frame though their offsets do not: position channels
+/// that were left at 0.
+fn collapsed_joints(clip: &Clip) -> Option<String> {
+    let joints = clip.skeleton.joints.iter().enumerate();
+    let collapsed: Vec<&str> = joints
+        .filter(|(_, joint)| joint.parent.is_some() && joint.offset.length() > 0.0)
+        .filter(|(index, _)| {
+            let stays = |pose: &super::Pose| pose.translations[*index] == DVec3::ZERO;
+            clip.poses.iter().all(stays)
+        })
+        .map(|(_, joint)| joint.name.as_str())
+        .collect();
+    if collapsed.is_empty() || clip.poses.is_empty() {
+        return None;
+    }
+    let dots = if collapsed.len() > NAMED { ", ..." } else { "" };
+    Some(format!(
+        "the position channels of {} joints ({}{dots}) are 0 in every frame though their offsets are not: \
+         they stand on their parents",
+        collapsed.len(),
+        collapsed[..collapsed.len().min(NAMED)].join(", ")
+    ))
+}
+
+/// First frames, such as a T-pose, from which the clip jumps further than it ever moves afterwards.
+fn jump_at_the_beginning(clip: &Clip) -> Option<String> {
+    let positions: Vec<Vec<DVec3>> = clip
+        .poses
+        .iter()
+        .map(|pose| pose.world_positions(&clip.skeleton))
+        .collect();
+    let steps: Vec<f64> = positions
+        .windows(2)
+        .map(|pair| farthest(&pair[0], &pair[1]))
+        .collect();
+    let frames = clip.poses.len() as f64;
+    let beginning = (BEGINNING / clip.frame_time).min(BEGINNING_SHARE * frames) as usize;
+    // The largest step after each.
+    let mut later = vec![0.0; steps.len()];
+    for index in (1..steps.len()).rev() {
+        later[index - 1] = f64::max(later[index], steps[index]);
+    }
+    let least = LEAST_JUMP * extent(positions.last()?);
+    let jump = (0..beginning.min(steps.len().saturating_sub(1)))
+        .rev()
+        .find(|&index| steps[index] > least && steps[index] > JUMP * later[index])?;
+    Some(format!(
+        "the body jumps from frame {jump} to frame {next} as nowhere after it, which may be a T-pose before the dance; \
+         data.skip_frames = {next} in a config leaves the first frames out",
+        next = jump + 1
+    ))
+}
+
+fn farthest(from: &[DVec3], to: &[DVec3]) -> f64 {
+    let ways = from.iter().zip(to).map(|(a, b)| a.distance(*b));
+    ways.fold(0.0, f64::max)
+}
+
+/// The longest edge of the box around some points.
+fn extent(points: &[DVec3]) -> f64 {
+    let first = points.first().copied().unwrap_or_default();
+    let low = points.iter().fold(first, |low, point| low.min(*point));
+    let high = points.iter().fold(first, |high, point| high.max(*point));
+    (high - low).max_element()
+}

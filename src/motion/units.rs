@@ -1,0 +1,346 @@
+//! Units and axes of clips from other programs: recognised by the body, converted to centimetres
+//! with Y up.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::clip::{Clip, Pose};
+use super::skeleton::Skeleton;
+
+/// Frames that are looked at, spread evenly over a clip.
+const SAMPLES: usize = 256;
+/// A body from sole to crown by the way along its bones from an ankle to the head joint.
+const WHOLE_BODY: f64 = 1.12;
+/// How tall a grown-up is, m, with some room for skeletons that are no exact measure.
+const GROWN_UP: RangeInclusive<f64> = 1.15..=2.3;
+/// Bodies that are taken as they are, cm: no other unit makes one of them.
+const IN_CM: RangeInclusive<f64> = 95.0..=300.0;
+/// A body stands along an axis with which the way from its feet to its head has at least this
+/// cosine.
+const STANDS: f64 = 0.8;
+/// Its feet are on the floor within this share of its height.
+const FLOOR: f64 = 0.2;
+
+/// The unit of a file's lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// Recognised by the height of the body.
+    #[default]
+    Auto,
+    Cm,
+    M,
+    Mm,
+    In,
+}
+
+/// The axis that points up in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Up {
+    /// Recognised by the rest pose and by how the body stands in most frames.
+    #[default]
+    Auto,
+    Y,
+    Z,
+}
+
+impl Unit {
+    const ALL: [(&'static str, Self); 5] = [
+        ("auto", Self::Auto),
+        ("cm", Self::Cm),
+        ("m", Self::M),
+        ("mm", Self::Mm),
+        ("in", Self::In),
+    ];
+
+    /// cm in one of it; 1 where it is not declared.
+    pub fn cm(self) -> f64 {
+        match self {
+            Self::Auto | Self::Cm => 1.0,
+            Self::M => 100.0,
+            Self::Mm => 0.1,
+            Self::In => 2.54,
+        }
+    }
+}
+
+impl Up {
+    const ALL: [(&'static str, Self); 3] = [("auto", Self::Auto), ("y", Self::Y), ("z", Self::Z)];
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::ALL.iter().find(|(_, unit)| unit == self);
+        f.write_str(name.map_or("", |(name, _)| name))
+    }
+}
+
+impl fmt::Display for Up {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::ALL.iter().find(|(_, up)| up == self);
+        f.write_str(name.map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for Unit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let unit = Self::ALL.into_iter().find(|(name, _)| *name == text);
+        let expected = || "expected auto, cm, m, mm or in".to_string();
+        unit.map(|(_, unit)| unit).ok_or_else(expected)
+    }
+}
+
+impl FromStr for Up {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let up = Self::ALL.into_iter().find(|(name, _)| *name == text);
+        let expected = || "expected auto, y or z".to_string();
+        up.map(|(_, up)| up).ok_or_else(expected)
+    }
+}
+
+/// What a clip's body says of its unit and axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Measured {
+    /// Height of the body, in the clip's own unit; none for a skeleton without a head and feet that
+    /// are called so.
+    pub height: Option<f64>,
+    /// The unit in which that is a person's height, if one.
+    pub unit: Option<Unit>,
+    /// The axis along which it stands, where it can be told.
+    pub up: Option<Up>,
+}
+
+impl Measured {
+    /// Measures the body of a clip.
+    pub fn of(clip: &Clip) -> Self {
+        let Some(body) = Body::of(&clip.skeleton) else {
+            return Self::default();
+        };
+        let rest = rest_pose(&clip.skeleton);
+        let step = clip.poses.len().div_ceil(SAMPLES).max(1);
+        let sampled: Vec<&Pose> = clip.poses.iter().step_by(step).collect();
+        let moved = median(sampled.iter().map(|pose| body.length(pose)));
+        // A body whose joints have all collapsed into one has its offsets left.
+        let length = Some(moved).filter(|&length| length > 0.0);
+        let height = WHOLE_BODY * length.unwrap_or_else(|| body.length(&rest));
+        Self {
+            height: Some(height),
+            unit: unit_of(height),
+            up: body.up(&clip.skeleton, &rest, &sampled, height),
+        }
+    }
+}
+
+/// Brings a clip from the unit and axis that are declared, or else recognised, to cm and Y up. Says
+/// what was recognised and done; nothing of a clip that is in cm and Y up, which stays as it is.
+pub fn to_cm_and_y_up(clip: &mut Clip, unit: Unit, up: Up) -> Vec<String> {
+    let mut notices = Vec::new();
+    let measured = match (unit, up) {
+        (Unit::Auto, _) | (_, Up::Auto) => Measured::of(clip),
+        _ => Measured::default(),
+    };
+    if unit == Unit::Auto
+        && let Some(height) = measured.height
+        && measured.unit != Some(Unit::Cm)
+    {
+        notices.push(match measured.unit {
+            Some(unit) => format!(
+                "the body is {} units tall: taken as {unit} and converted to cm; another unit can be declared",
+                rounded(height)
+            ),
+            None => format!(
+                "the body is {} units tall, which is a grown-up in none of cm, m, mm and in: taken as cm; the unit can be declared",
+                rounded(height)
+            ),
+        });
+    }
+    if up == Up::Auto && measured.up == Some(Up::Z) {
+        let done = "the body stands along Z: turned so that Y is up; another axis can be declared";
+        notices.push(done.into());
+    }
+    let unit = match unit {
+        Unit::Auto => measured.unit.unwrap_or_default(),
+        declared => declared,
+    };
+    scale(clip, unit.cm());
+    if up == Up::Z || up == Up::Auto && measured.up == Some(Up::Z) {
+        turn_z_up(clip);
+    }
+    notices
+}
+
+/// A height with two digits, so that many dancers have one notice.
+fn rounded(height: f64) -> f64 {
+    let digits = 1 - height.max(f64::MIN_POSITIVE).log10().floor() as i32;
+    (height * 10f64.powi(digits)).round() / 10f64.powi(digits)
+}
+
+/// Multiplies every length of a clip.
+fn scale(clip: &mut Clip, factor: f64) {
+    if factor == 1.0 {
+        return;
+    }
+    for joint in &mut clip.skeleton.joints {
+        joint.offset *= factor;
+        joint.end_sites.iter_mut().for_each(|end| *end *= factor);
+    }
+    for pose in &mut clip.poses {
+        pose.translations
+            .iter_mut()
+            .for_each(|place| *place *= factor);
+    }
+}
+
+/// Turns a clip from Z up to Y up: its axes become (x, z, -y).
+///
+/// Offsets, translations and rotations are turned whole, so that the rest pose stands, too. Where
+/// the rest pose stands along Y already, it is the root that carries the motion's axes, and it
+/// alone is turned.
+pub(super) fn turn_z_up(clip: &mut Clip) {
+    let rest = rest_pose(&clip.skeleton);
+    let stands = |body: Body| body.rises(&clip.skeleton, &rest).y > STANDS;
+    if Body::of(&clip.skeleton).is_some_and(stands) {
+        let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        for (index, joint) in clip.skeleton.joints.iter().enumerate() {
+            if joint.parent.is_some() {
+                continue;
+            }
+            for pose in &mut clip.poses {
+                pose.translations[index] = turned(pose.translations[index]);
+                pose.rotations[index] = (turn * pose.rotations[index]).normalize();
+            }
+        }
+        return;
+    }
+    for joint in &mut clip.skeleton.joints {
+        joint.offset = turned(joint.offset);
+        for end in &mut joint.end_sites {
+            *end = turned(*end);
+        }
+    }
+    for pose in &mut clip.poses {
+        for place in &mut pose.translations {
+            *place = turned(*place);
+        }
+        for rotation in &mut pose.rotations {
+            let axis = turned(DVec3::new(rotation.x, rotation.y, rotation.z));
+            *rotation = DQuat::from_xyzw(axis.x, axis.y, axis.z, rotation.w);
+        }
+    }
+}
+
+fn turned(vector: DVec3) -> DVec3 {
+    // 0 - y, for no -0 where y is 0.
+    DVec3::new(vector.x, vector.z, 0.0 - vector.y)
+}
+
+fn unit_of(height: f64) -> Option<Unit> {
+    if IN_CM.contains(&height) {
+        return Some(Unit::Cm);
+    }
+    [Unit::M, Unit::In, Unit::Mm]
+        .into_iter()
+        .find(|unit| GROWN_UP.contains(&(height * unit.cm() / 100.0)))
+}
+
+fn rest_pose(skeleton: &Skeleton) -> Pose {
+    Pose {
+        translations: skeleton.joints.iter().map(|joint| joint.offset).collect(),
+        rotations: vec![DQuat::IDENTITY; skeleton.len()],
+    }
+}
+
+/// Where a skeleton has its head and its feet.
+struct Body {
+    head: usize,
+    /// At least one.
+    feet: Vec<usize>,
+    /// The joints on the way from each foot to the head, without the one where it turns upwards.
+    ways: Vec<Vec<usize>>,
+}
+
+impl Body {
+    fn of(skeleton: &Skeleton) -> Option<Self> {
+        let called = |index: usize, words: &[&str]| {
+            let name = skeleton.joints[index].name.to_lowercase();
+            words.iter().any(|word| name.contains(word))
+        };
+        let ancestors = |joint: usize| {
+            let parent = |&joint: &usize| skeleton.joints[joint].parent;
+            std::iter::successors(Some(joint), parent)
+        };
+        let head = (0..skeleton.len()).find(|&joint| called(joint, &["head"]))?;
+        let foot = |joint: usize| called(joint, &["foot", "ankle"]);
+        let feet: Vec<usize> = (0..skeleton.len())
+            .filter(|&joint| foot(joint) && !ancestors(joint).skip(1).any(foot))
+            .collect();
+        let above: Vec<usize> = ancestors(head).collect();
+        let way = |&foot: &usize| {
+            let fork = ancestors(foot).find(|joint| above.contains(joint))?;
+            let legs = ancestors(foot).take_while(|&joint| joint != fork);
+            let spine = ancestors(head).take_while(|&joint| joint != fork);
+            Some(legs.chain(spine).collect())
+        };
+        let ways: Vec<Vec<usize>> = feet.iter().map(way).collect::<Option<_>>()?;
+        (!feet.is_empty()).then_some(Self { head, feet, ways })
+    }
+
+    /// The way along the bones from the feet to the head.
+    fn length(&self, pose: &Pose) -> f64 {
+        let lengths = self.ways.iter().map(|way| -> f64 {
+            let bones = way.iter().map(|&joint| pose.translations[joint].length());
+            bones.sum()
+        });
+        lengths.fold(0.0, f64::max)
+    }
+
+    /// The direction from the feet to the head; zero where they are at one place.
+    fn rises(&self, skeleton: &Skeleton, pose: &Pose) -> DVec3 {
+        let positions = pose.world_positions(skeleton);
+        let feet: DVec3 = self.feet.iter().map(|&foot| positions[foot]).sum();
+        (positions[self.head] - feet / self.feet.len() as f64).normalize_or_zero()
+    }
+
+    /// Whether it stands along an axis in most of these frames, on the plane through the origin:
+    /// somebody who lies along the axis hardly has the feet there.
+    fn stands_in(&self, skeleton: &Skeleton, sampled: &[&Pose], axis: usize, height: f64) -> bool {
+        let rise = median(sampled.iter().map(|pose| self.rises(skeleton, pose)[axis]));
+        let lower_foot = |pose: &&Pose| {
+            let positions = pose.world_positions(skeleton);
+            let heights = self.feet.iter().map(|&foot| positions[foot][axis]);
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        rise > STANDS && median(sampled.iter().map(lower_foot)).abs() < FLOOR * height
+    }
+
+    /// A rest pose that stands along Y says so, whatever its dancer does (lying is no other axis);
+    /// one that stands along Z, unless the frames stand along Y. One that does not stand (many have
+    /// all bones along X) leaves it to the frames.
+    fn up(&self, skeleton: &Skeleton, rest: &Pose, sampled: &[&Pose], height: f64) -> Option<Up> {
+        let at_rest = self.rises(skeleton, rest);
+        let stands_in = |axis: usize| self.stands_in(skeleton, sampled, axis, height);
+        if at_rest.y > STANDS || stands_in(1) {
+            Some(Up::Y)
+        } else if at_rest.z > STANDS || stands_in(2) {
+            Some(Up::Z)
+        } else {
+            None
+        }
+    }
+}
+
+/// 0 of none.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
