@@ -44,6 +44,11 @@ pub enum SynthesisError {
         joint: String,
         degrees: f64,
     },
+    #[error(
+        "the legs of {clip} are {ratio:.3} times as long as those of the first keyframe's dancer, which is more than dancers differ; \
+         declare the file's unit (--unit)"
+    )]
+    Size { clip: String, ratio: f64 },
     #[error("{what} is {value}; expected {expected}")]
     Value {
         what: &'static str,

@@ -132,10 +132,12 @@ pub struct Keyframes {
     motion: Option<(PathBuf, usize)>,
     mapping: Option<Mapping>,
     data: DataConfig,
+    notices: Vec<String>,
 }
 
 impl Keyframes {
-    /// Reads the files of a choice.
+    /// Reads the files of a choice, in the unit, axis and rate of `data`; frames count from a file's
+    /// first, also where `data` leaves first frames out.
     ///
     /// # Errors
     /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton.
@@ -180,18 +182,28 @@ impl Keyframes {
             keyframes,
             motion,
             mapping: path.map(Mapping::read).transpose()?,
-            data: data.clone(),
+            data: DataConfig {
+                skip_frames: 0,
+                ..data.clone()
+            },
+            notices: Vec::new(),
         };
         for keyframe in read.keyframes.clone() {
             if !read.sources.contains_key(&keyframe.file) {
-                let source = read.source(&keyframe.file)?;
+                let (source, notices) = read.source(&keyframe.file)?;
+                read.notices.extend(notices);
                 read.sources.insert(keyframe.file.clone(), source);
             }
         }
         Ok(read)
     }
 
-    fn source(&self, path: &Path) -> Result<Source, KeyframeError> {
+    /// What is odd about the files, or was recognised and converted; no error.
+    pub fn notices(&self) -> &[String] {
+        &self.notices
+    }
+
+    fn source(&self, path: &Path) -> Result<(Source, Vec<String>), KeyframeError> {
         let document = bvh::read(path)?;
         let clip = document.to_clip();
         let own = clip.skeleton.is_dance_skeleton();
@@ -204,16 +216,18 @@ impl Keyframes {
         let channels = document.channels();
         let channels = (own && channels.iter().all(turns)).then(|| channels.to_vec());
         let mapping = self.mapping.as_ref().filter(|_| !own);
-        let clip =
-            DanceClip::new(clip, mapping, &self.data).map_err(|source| KeyframeError::Clip {
-                file: path.into(),
-                source: source.into(),
+        let (clip, notices) =
+            DanceClip::from_file(clip, mapping, &self.data).map_err(|source| {
+                KeyframeError::Clip {
+                    file: path.into(),
+                    source: source.into(),
+                }
             })?;
-        Ok(Source { clip, channels })
+        Ok((Source { clip, channels }, notices))
     }
 
     /// Velocity factors of a further file, read on the same terms, in `frames` frames from its
-    /// frame `first` on, `[frames, 5]`, cm/frame.
+    /// frame `first` on, `[frames, 5]`, cm/frame; and notices of a file that was not read before.
     ///
     /// # Errors
     /// It cannot be read, is on another skeleton or ends too early.
@@ -222,12 +236,13 @@ impl Keyframes {
         path: &Path,
         first: usize,
         frames: usize,
-    ) -> Result<Array2<f64>, KeyframeError> {
-        let read;
+    ) -> Result<(Array2<f64>, Vec<String>), KeyframeError> {
+        let (read, mut notices);
+        notices = Vec::new();
         let clip = match self.sources.get(path) {
             Some(source) => &source.clip,
             None => {
-                read = self.source(path)?;
+                (read, notices) = self.source(path)?;
                 &read.clip
             }
         };
@@ -240,7 +255,7 @@ impl Keyframes {
             });
         }
         let rows = s![first..first + frames, VELOCITY_FACTORS];
-        Ok(clip.features.slice(rows).to_owned())
+        Ok((clip.features.slice(rows).to_owned(), notices))
     }
 
     /// The dancer's clip.

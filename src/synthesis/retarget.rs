@@ -10,8 +10,12 @@ use crate::motion::{Pose, Skeleton};
 
 /// Bones that differ by no more than this are the same, cm.
 const SAME: f64 = 1e-6;
+/// Bones below this share of the legs' length are too short to have a direction.
+const SHORT: f64 = 1.0 / 160.0;
 /// Rest directions of a bone may differ by this between two dancers, rad.
 const REST: f64 = 0.5;
+/// Legs of two dancers are at most so many times as long, whatever their sizes.
+const SIZES: f64 = 3.0;
 /// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis
 /// stands.
 const LEGS: [&str; 4] = ["LeftLeg", "LeftFoot", "RightLeg", "RightFoot"];
@@ -57,7 +61,8 @@ pub(super) fn with_constant_bones(
 ///
 /// # Errors
 /// [`SynthesisError::RestPose`]: the two skeletons' bones point in different directions at rest, so
-/// that rotations of one mean nothing on the other.
+/// that rotations of one mean nothing on the other. [`SynthesisError::Size`]: they are in different
+/// units.
 pub(super) fn retarget(
     mut keyframe: KeyframePose,
     from: &Skeleton,
@@ -67,10 +72,17 @@ pub(super) fn retarget(
     if has_bones(&keyframe.pose, skeleton) {
         return Ok(keyframe);
     }
+    let legs = |skeleton: &Skeleton| -> f64 {
+        let joints = skeleton.joints.iter();
+        let bones = joints.filter(|joint| LEGS.contains(&joint.name.as_str()));
+        bones.map(|joint| joint.offset.length()).sum()
+    };
+    let (their_legs, our_legs) = (legs(from), legs(skeleton));
     for (theirs, ours) in from.joints.iter().zip(&skeleton.joints).skip(1) {
-        let bones = theirs.offset.length().min(ours.offset.length());
+        let has_direction =
+            theirs.offset.length() > SHORT * their_legs && ours.offset.length() > SHORT * our_legs;
         let apart = theirs.offset.angle_between(ours.offset);
-        if bones > 1.0 && apart > REST {
+        if has_direction && apart > REST {
             return Err(SynthesisError::RestPose {
                 clip: clip.into(),
                 joint: ours.name.clone(),
@@ -78,14 +90,15 @@ pub(super) fn retarget(
             });
         }
     }
-    let legs = |skeleton: &Skeleton| -> f64 {
-        let joints = skeleton.joints.iter();
-        let bones = joints.filter(|joint| LEGS.contains(&joint.name.as_str()));
-        bones.map(|joint| joint.offset.length()).sum()
-    };
-    let (theirs, ours) = (legs(from), legs(skeleton));
-    if theirs > SAME {
-        keyframe.pose.translations[0].y *= ours / theirs;
+    let ratio = their_legs / our_legs;
+    if their_legs.min(our_legs) > SAME && !(1.0 / SIZES..=SIZES).contains(&ratio) {
+        return Err(SynthesisError::Size {
+            clip: clip.into(),
+            ratio,
+        });
+    }
+    if their_legs > SAME {
+        keyframe.pose.translations[0].y *= our_legs / their_legs;
     }
     set_bones(&mut keyframe.pose, skeleton);
     refresh(&mut keyframe, skeleton);
