@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::clip_choice::ClipChoice;
-use super::notice::notice;
+use super::notice::{notice, warn};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset};
@@ -60,6 +60,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         );
     }
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
+    warn(&dataset.warnings);
     if !args.other_data {
         subject.check_data(&dataset, &args.data)?;
     }

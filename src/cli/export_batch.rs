@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use clap::Args;
 
+use super::notice::warn;
 use crate::data::Dataset;
 use crate::models::transition::exported_batch::{ExportError, ExportedBatch, export_batch};
 use crate::models::transition::{DanceClip, Forcing, TransitionSettings};
@@ -41,6 +42,7 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let settings = settings.context("only a model of transitions has batches to export")?;
     let model = settings.load(&config.name, &run.saved_weights(&config)?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
+    warn(&dataset.warnings);
     let clips = DanceClip::measure_all(&dataset.train, &config.data.features())?;
     let batch = ExportedBatch {
         frames: args.frames.into(),

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
+use super::file_units::FileUnits;
+use super::notice::warn;
 use crate::data::DataConfig;
 use crate::models::transition::DanceClip;
 use crate::motion::{Mapping, bvh};
@@ -20,6 +22,8 @@ pub struct FeaturesArgs {
     /// Mapping file for a skeleton other than the dance skeleton
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
+    #[command(flatten)]
+    units: FileUnits,
 }
 
 /// # Errors
@@ -28,7 +32,9 @@ pub struct FeaturesArgs {
 pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
     let mapping = args.mapping.as_deref().map(Mapping::read).transpose()?;
     let clip = bvh::read(&args.file)?.to_clip();
-    let measured = DanceClip::new(clip, mapping.as_ref(), &DataConfig::default())?;
+    let data = args.units.over(&DataConfig::default());
+    let (measured, notices) = DanceClip::from_file(clip, mapping.as_ref(), &data)?;
+    warn(&notices);
     let array = measured.features.mapv(|value| value as f32);
     ndarray_npy::write_npy(&args.npy, &array)
         .with_context(|| format!("{} cannot be written", args.npy.display()))?;

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
+use super::notice::warn;
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::models::registry;
@@ -70,6 +71,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         .figures
         .with_context(|| format!("{} has no figures that could be drawn", paper.name))?;
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
+    warn(&dataset.warnings);
     if !args.other_data {
         for model in compared.iter().chain([&subject]) {
             model.check_data(&dataset, &args.data)?;

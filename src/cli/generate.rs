@@ -11,7 +11,8 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Args;
 
-use super::notice::notice;
+use super::file_units::FileUnits;
+use super::notice::{notice, warn};
 use crate::models::transition::DataRanges;
 use crate::motion::Clip;
 use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
@@ -36,6 +37,8 @@ pub struct GenerateArgs {
     run: PathBuf,
     #[command(flatten)]
     keyframes: KeyframeArgs,
+    #[command(flatten)]
+    units: FileUnits,
     /// Where to write the motion
     #[arg(long, value_name = "FILE.bvh")]
     out: PathBuf,
@@ -64,7 +67,9 @@ pub struct GenerateArgs {
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
-    let keyframes = Keyframes::read(&args.keyframes.choice(), &subject.config.data)?;
+    let data = args.units.over(&subject.config.data);
+    let keyframes = Keyframes::read(&args.keyframes.choice(), &data)?;
+    warn(keyframes.notices());
     let request = keyframes.request(&args.keyframes.length)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
     let request = args.velocity.apply(request, &keyframes)?;

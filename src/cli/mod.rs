@@ -9,6 +9,7 @@ mod evaluate;
 mod export_batch;
 mod features;
 mod figures;
+mod file_units;
 mod generate;
 mod gradcheck;
 mod notice;

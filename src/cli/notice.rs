@@ -8,3 +8,10 @@ use std::io::{self, Write as _};
 pub fn notice(line: impl Display) {
     let _ = writeln!(io::stderr(), "{line}");
 }
+
+/// Warnings that the library gives beside what it read, a line each on stderr.
+pub fn warn(warnings: &[String]) {
+    for warning in warnings {
+        notice(format_args!("warning: {warning}"));
+    }
+}

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use anyhow::{anyhow, bail};
 use clap::Args;
 
-use super::notice::notice;
+use super::notice::{notice, warn};
 use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
@@ -109,6 +109,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         ),
     };
     let dataset = rows::dataset(&rows, &args.data)?;
+    warn(&dataset.warnings);
     let terminal = Terminal {
         alone: args.jobs == 1,
         stop: Stop::on_signal()?,

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::notice::notice;
+use super::notice::{notice, warn};
 use super::progress::Progress;
 use super::stop::{Stop, interrupted, quote};
 use super::threads::Threads;
@@ -47,6 +47,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let mut out = io::stdout();
     writeln!(out, "{}", config.to_toml()?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
+    warn(&dataset.warnings);
     let threads = args.threads.count();
     let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
     describe(&trainer, threads)?;

@@ -26,6 +26,7 @@ mod documents;
 mod evaluate;
 mod figures;
 mod generate;
+mod odd_files;
 mod report;
 mod reproduce;
 mod stopped;

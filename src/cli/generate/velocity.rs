@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::notice::warn;
 use crate::models::generator::Condition;
 use crate::synthesis::SequenceRequest;
 use crate::synthesis::controls::{Gains, read_velocity_factors};
@@ -55,7 +56,8 @@ impl VelocityArgs {
                 }
                 _ => (PathBuf::from(source), 0),
             };
-            let factors = keyframes.velocity_factors(&path, first, frames)?;
+            let (factors, notices) = keyframes.velocity_factors(&path, first, frames)?;
+            warn(&notices);
             request = request.with_velocity_factors(factors)?;
         }
         match self.velocity {
