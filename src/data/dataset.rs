@@ -105,7 +105,8 @@ pub enum DataError {
 }
 
 impl Recording {
-    /// A clip in cm with Y up, brought to the config's rate and, where there is a mapping, onto its skeleton.
+    /// A clip in cm with Y up, brought to the config's rate and, where there is a mapping, onto its
+    /// skeleton.
     ///
     /// # Errors
     /// The clip cannot be resampled or mapped.
