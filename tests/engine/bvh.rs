@@ -153,6 +153,8 @@ fn inspect_prints_what_the_file_holds() {
     duration     0.017 s
     joints       2 and 2 End Sites
     channels     10
+    unit         not recognised, taken as cm (no head and feet by name)
+    up           not recognised, taken as Y
     root height  0.000 to 20.000
     hierarchy
       Hips  offset 1 2 3  [Xposition Yposition Zposition Zrotation Xrotation Yrotation]
