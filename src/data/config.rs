@@ -23,7 +23,8 @@ pub struct DataConfig {
     /// Mapping file for clips on another skeleton than the dance skeleton.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mapping: Option<PathBuf>,
-    /// Unit of the files' lengths: "cm", "m", "mm", "in"; "auto" recognises it by the body's height.
+    /// Unit of the files' lengths: "cm", "m", "mm", "in"; "auto" recognises it by the body's
+    /// height.
     #[serde(skip_serializing_if = "is_default")]
     pub unit: Unit,
     /// Axis that points up in the files: "y", "z"; "auto" recognises it by how the body stands.

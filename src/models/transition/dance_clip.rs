@@ -18,8 +18,8 @@ pub struct DanceClip {
 }
 
 impl DanceClip {
-    /// A clip in cm with Y up, brought to the config's rate, put on the dance skeleton by `mapping` where there is
-    /// one, and measured.
+    /// A clip in cm with Y up, brought to the config's rate, put on the dance skeleton by `mapping`
+    /// where there is one, and measured.
     ///
     /// # Errors
     /// The clip cannot be resampled, mapped or measured.
