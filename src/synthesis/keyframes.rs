@@ -136,8 +136,8 @@ pub struct Keyframes {
 }
 
 impl Keyframes {
-    /// Reads the files of a choice, in the unit, axis and rate of `data`; frames count from a file's
-    /// first, also where `data` leaves first frames out.
+    /// Reads the files of a choice, in the unit, axis and rate of `data`; frames count from the
+    /// first of a file, also where `data` leaves first frames out.
     ///
     /// # Errors
     /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton.

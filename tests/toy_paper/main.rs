@@ -1,5 +1,6 @@
 //! A paper from outside this crate is added by one call and goes through the paths that the
-//! commands run. With the features of the papers left out, too: the rooms that all papers share need none.
+//! commands run. With the feature of the papers left out, too: the rooms that all papers share need
+//! none.
 
 mod rooms;
 mod toy;

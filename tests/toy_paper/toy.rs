@@ -1,5 +1,6 @@
 //! A toy paper, "Toy 2026: the height of a dancer's root, sampled": with the click c_t of the
-//! music, `h_t ~ Normal(m + a (h_(t-1) - m) + b c_t, e^(2 s))`, m a running mean, a, b and s learned.
+//! music, `h_t ~ Normal(m + a (h_(t-1) - m) + b c_t, e^(2 s))`, m a running mean, a, b and s
+//! learned.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
