@@ -15,7 +15,7 @@ use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset, Recording};
-use crate::evaluation::Tables;
+use crate::evaluation::{ProtocolScores, Tables};
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 use crate::models::baselines::interpolation::Interpolation;
@@ -79,10 +79,12 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
         contact_threshold: config.data.contact_threshold,
     };
     let pool = args.threads.pool()?;
-    let protocol = config.protocol();
+    // The paper's numbers are of other data, so its own way of counting adds nothing here.
+    let protocols = &config.protocols()[..1];
+    let protocol = &*protocols[0];
     let evaluate = |model: &dyn Generator| {
-        pool.install(|| evaluate_watched(&*protocol, model, &dataset, DataPart::Test))
-            .map(|evaluated| evaluated.scores)
+        pool.install(|| evaluate_watched(protocol, model, &dataset, DataPart::Test))
+            .map(|evaluated| ProtocolScores::new([(protocol.name(), evaluated.scores)]))
     };
     let comparison = Comparison {
         interpolation: evaluate(&interpolation)?,
@@ -91,8 +93,8 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     };
     let manifest = run.manifest()?.context("the training left no manifest")?;
     let rows = comparison.rows(config, &manifest);
-    let (metrics, printed) = (protocol.metrics(), &config.printed()?);
-    let tables = Tables { metrics, printed };
+    let (protocols, printed) = (protocols, &config.printed()?);
+    let tables = Tables { protocols, printed };
     write!(out, "\n{}\n", tables.terminal(&rows))?;
     demo::write_scores(run.path(), &settings, &dataset, &comparison, tables, &rows)?;
 

@@ -12,7 +12,9 @@ use super::notice::{notice, warn};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{EvaluatedData, EvaluationOptions, EvaluationRecord, TableRow, Tables};
+use crate::evaluation::{
+    EvaluatedData, EvaluationOptions, EvaluationRecord, ProtocolScores, TableRow, Tables,
+};
 use crate::run::Subject;
 
 #[derive(Debug, Args)]
@@ -30,8 +32,15 @@ pub struct EvaluateArgs {
     /// the mean over these
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
     lengths: Vec<u16>,
-    /// Write the scores here, too; a run's folder gets those of its own model at the paper's
-    /// lengths anyway, as evaluation.json (evaluation_validation.json, evaluation_train.json)
+    /// Score at most this many windows of each length, spread evenly over all: cheap, and not
+    /// comparable with scores on all of them
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    windows: Option<u32>,
+    /// Ways of counting to score by, such as published, instead of all that the model's paper has
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    protocol: Vec<String>,
+    /// Write the scores here, too; a run's folder gets those of its own model by all protocols, on
+    /// all windows of the paper's lengths anyway, as evaluation.json (evaluation_validation.json, evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's
@@ -76,30 +85,48 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     let lengths = BTreeSet::from_iter(args.lengths.iter().map(|&length| length.into()));
     let options = EvaluationOptions {
         lengths: lengths.into_iter().collect(),
-        most_windows: None,
+        most_windows: args.windows.map(|most| most as usize),
     };
-    let protocol = config.model.protocol(&config.data, &options);
-    let pool = args.threads.pool()?;
-    let evaluation =
-        pool.install(|| evaluate_watched(&*protocol, &*subject.model, &dataset, part))?;
-    for warning in &evaluation.warnings {
-        notice(format_args!("warning: {warning}"));
+    let mut protocols = config.model.protocols(&config.data, &options);
+    let known: Vec<&str> = protocols.iter().map(|protocol| protocol.name()).collect();
+    let chosen = |name: &str| args.protocol.iter().any(|chosen| chosen == name);
+    if let Some(name) = args.protocol.iter().find(|name| !known.contains(&&***name)) {
+        let (kind, known) = (config.model.kind(), known.join(", "));
+        anyhow::bail!("--protocol {name}: {kind} has no such protocol; it has {known}");
     }
-    let scores = evaluation.scores;
+    protocols.retain(|protocol| args.protocol.is_empty() || chosen(protocol.name()));
+    let pool = args.threads.pool()?;
+    let mut scores = Vec::new();
+    for protocol in &protocols {
+        let evaluation =
+            pool.install(|| evaluate_watched(&**protocol, &*subject.model, &dataset, part))?;
+        for warning in &evaluation.warnings {
+            notice(format_args!("warning: {warning}"));
+        }
+        scores.push((protocol.name(), evaluation.scores));
+    }
+    let scores = ProtocolScores::new(scores);
     let row = TableRow {
         name: config.name.clone(),
         seed: None,
         scores: Some(scores.clone()),
         schedule_note: String::new(),
     };
-    let (metrics, printed) = (protocol.metrics(), &config.printed()?);
-    write!(out, "{}", Tables { metrics, printed }.terminal(&[row]))?;
+    let (protocols, printed) = (&protocols, &config.printed()?);
+    write!(out, "{}", Tables { protocols, printed }.terminal(&[row]))?;
+    if let Some(most) = args.windows {
+        writeln!(
+            out,
+            "\nat most {most} windows of each length: not comparable with scores on all"
+        )?;
+    }
     let record = EvaluationRecord { scores, data };
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
+    let all = args.lengths.is_empty() && args.windows.is_none() && args.protocol.is_empty();
     let of_its_own = match &subject.run {
-        Some(run) => args.lengths.is_empty() && *run.config()?.model == *subject.config.model,
+        Some(run) => all && *run.config()?.model == *subject.config.model,
         None => true,
     };
     if let Some(folder) = subject.scores_folder(args.out.as_deref())?

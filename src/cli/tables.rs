@@ -28,9 +28,8 @@ pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let runs = EvaluatedRun::read_all(&args.runs)?;
     let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();
     let first = runs.first().context("no run was given")?;
-    let protocol = first.config.protocol();
-    let (metrics, printed) = (protocol.metrics(), &first.config.printed()?);
-    let text = Tables { metrics, printed }.markdown(&rows, &first.record.data.caption());
+    let (protocols, printed) = (&first.config.protocols(), &first.config.printed()?);
+    let text = Tables { protocols, printed }.markdown(&rows, &first.record.data.caption());
     replace_file(&args.out, text)?;
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(())

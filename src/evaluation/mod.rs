@@ -6,13 +6,18 @@ pub mod equations;
 mod metric;
 mod printed;
 pub mod protocol;
+mod protocol_table;
+#[cfg(feature = "papers")]
+pub mod published;
 mod record;
 pub mod scores;
 pub mod tables;
+#[cfg(feature = "papers")]
+pub mod transitions;
 
 pub use metric::{Better, Metric};
 pub use printed::{PrintedError, PrintedRow, PrintedTable, PrintedTables};
 pub use protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
 pub use record::{EvaluatedData, EvaluationRecord, RecordError};
-pub use scores::{ScoreRow, Scores};
+pub use scores::{ProtocolScores, ScoreRow, Scores};
 pub use tables::{TableRow, Tables};

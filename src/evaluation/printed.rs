@@ -12,6 +12,9 @@ use toml::Table;
 pub struct PrintedTables {
     /// The paper, such as "Pan et al. 2021".
     pub title: String,
+    /// The protocol that its numbers were counted by; none: the model's only one.
+    #[serde(default)]
+    pub protocol: Option<String>,
     /// Columns of all tables, as scores name them.
     #[serde(default)]
     pub columns: Vec<String>,
@@ -105,6 +108,11 @@ impl PrintedTables {
             }
         }
         Ok(printed)
+    }
+
+    /// Whether its numbers stand beside scores by this protocol.
+    pub fn compares(&self, protocol: &str) -> bool {
+        self.protocol.as_deref().is_none_or(|own| own == protocol)
     }
 
     /// The row of a config's name.

@@ -8,6 +8,12 @@ use crate::models::{Generator, ModelError};
 
 /// A way of scoring.
 pub trait Protocol: Send + Sync {
+    /// Its name, by which scores, tables and a paper's numbers know it.
+    fn name(&self) -> &'static str;
+
+    /// How it counts, in a few words for a caption.
+    fn about(&self) -> &'static str;
+
     /// Its metrics, in the order of their tables.
     fn metrics(&self) -> &[Metric];
 

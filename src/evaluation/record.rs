@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::Scores;
+use super::ProtocolScores;
 use crate::data::{DataPart, Dataset, EmptyPart, Recording};
 use crate::report::thousands;
 use crate::run::{FileError, write_json};
@@ -69,7 +69,7 @@ impl EvaluatedData {
 /// Scores and what they were measured on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationRecord {
-    pub scores: Scores,
+    pub scores: ProtocolScores,
     pub data: EvaluatedData,
 }
 
@@ -79,7 +79,7 @@ struct ScoresFile<'a> {
     #[serde(skip_serializing_if = "DataPart::is_test")]
     clips: DataPart,
     #[serde(flatten)]
-    scores: &'a Scores,
+    scores: &'a ProtocolScores,
 }
 
 impl EvaluationRecord {
@@ -157,7 +157,7 @@ fn read_json<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, Record
     let text = std::fs::read_to_string(&path).map_err(FileError::at(&path, "read"))?;
     serde_json::from_str(&text).map_err(|cause| {
         RecordError::Refused(format!(
-            "{} holds no scores on test clips; to get some, {}: {cause}",
+            "{} holds no scores by protocol on test clips; to get some, {}: {cause}",
             path.display(),
             remedy(folder)
         ))

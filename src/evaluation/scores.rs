@@ -105,6 +105,37 @@ impl Scores {
     }
 }
 
+/// The scores of a model by each protocol that it was scored by, as written to JSON: `{"equations":
+/// {"lrp": ..}, "published": ..}`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ProtocolScores {
+    #[serde(serialize_with = "as_map", deserialize_with = "in_order")]
+    protocols: Vec<(String, Scores)>,
+}
+
+impl ProtocolScores {
+    /// Scores by the protocols' names.
+    pub fn new(protocols: impl IntoIterator<Item = (impl Into<String>, Scores)>) -> Self {
+        let protocols = protocols.into_iter();
+        Self {
+            protocols: protocols.map(|(name, of)| (name.into(), of)).collect(),
+        }
+    }
+
+    /// The scores by a protocol.
+    pub fn by(&self, protocol: &str) -> Option<&Scores> {
+        let found = self.protocols.iter().find(|(name, _)| name == protocol);
+        found.map(|(_, scores)| scores)
+    }
+
+    /// All scores by protocol, in their order.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Scores)> {
+        let protocols = self.protocols.iter();
+        protocols.map(|(name, scores)| (name.as_str(), scores))
+    }
+}
+
 /// Writes a map in its own order.
 fn as_map<V: Serialize, S: Serializer>(
     entries: &[(String, V)],

@@ -1,10 +1,8 @@
 //! A paper's tables with our scores beside its own: as Markdown, and as plain text for the
 //! terminal.
 
-use std::collections::BTreeSet;
-
-use super::scores::{AVERAGE, ScoreRow, Scores};
-use super::{Metric, PrintedRow, PrintedTables};
+use super::protocol_table::{ProtocolTable, groups};
+use super::{PrintedTables, Protocol, ProtocolScores};
 
 /// One of our models in the tables.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,82 +12,34 @@ pub struct TableRow {
     /// The seed of its training. Rows that differ in it only are shown with their mean and spread.
     pub seed: Option<u64>,
     /// None where it is not trained yet: the row stands there all the same.
-    pub scores: Option<Scores>,
+    pub scores: Option<ProtocolScores>,
     /// The schedule that it was trained on, such as "0.002 of the paper's schedule, 1.2e6
     /// frame-steps"; "not trained" where nothing is learned.
     pub schedule_note: String,
 }
 
-/// The cell of a model that has no scores yet.
-const ABSENT: &str = "—";
-
-/// Tables of these metrics, beside what a paper prints of them.
-#[derive(Debug, Clone, Copy)]
+/// Tables of these protocols' metrics, beside what a paper prints of one.
+#[derive(Clone, Copy)]
 pub struct Tables<'a> {
-    pub metrics: &'a [Metric],
+    pub protocols: &'a [Box<dyn Protocol>],
     pub printed: &'a PrintedTables,
 }
 
 impl Tables<'_> {
-    /// The paper's tables in Markdown: for each model the paper's value, ours and the difference
-    /// (ours minus the paper's).
+    /// The tables in Markdown: by the paper's protocol for each model the paper's value, ours and
+    /// the difference (ours minus the paper's); by the others ours alone.
     ///
     /// All rows of the paper are there, in its order, then our models that it does not have. Rows
     /// of one model that differ in their seed only have their mean, standard deviation and range
-    /// too; a row without scores has "—" in every cell. `subject` says in the caption what ours
-    /// were evaluated on, such as "25 test clips of the dance data set". Where our columns are not
-    /// the paper's, they are ours and their mean is not compared.
+    /// too; a row without scores has "—" in every cell, one that was scored by another protocol
+    /// only is left out. `subject` says in the caption what ours were evaluated on, such as "25
+    /// test clips of the dance data set". Where our columns are not the paper's, they are ours and
+    /// their mean is not compared.
     pub fn markdown(&self, rows: &[TableRow], subject: &str) -> String {
-        let tables = self.tables().into_iter();
-        let text = |(number, metric)| self.markdown_table(number, metric, rows, subject);
-        tables.map(text).collect::<Vec<String>>().join("\n")
-    }
-
-    /// The metrics that have a table, with its number in the paper: all where the paper prints
-    /// none.
-    fn tables(&self) -> Vec<(Option<u32>, &Metric)> {
-        if self.printed.tables.is_empty() {
-            return self.metrics.iter().map(|metric| (None, metric)).collect();
-        }
-        let tables = self.printed.tables.iter().filter_map(|table| {
-            let of_table = |metric: &&Metric| metric.key == table.metric;
-            Some((table.number, self.metrics.iter().find(of_table)?))
-        });
-        tables.collect()
-    }
-
-    fn markdown_table(
-        &self,
-        number: Option<u32>,
-        metric: &Metric,
-        rows: &[TableRow],
-        subject: &str,
-    ) -> String {
-        let columns = self.columns(rows);
-        let mut out = match number {
-            Some(number) => format!("## Table {number}: {}\n\n", metric.title),
-            None => format!("## {}\n\n", metric.title),
-        };
-        let mut add = |title: &str, kind: &str, cells: &[String]| {
-            out += &format!("| {title} | {kind} | {} |\n", cells.join(" | "));
-        };
-        let titles: Vec<String> = columns.iter().map(|it| column_title(it, "N = ")).collect();
-        add("Model", "", &titles);
-        add("---", "---", &vec!["---:".into(); columns.len()]);
-        for group in self.groups(rows) {
-            let mut title = group.title.as_str();
-            for (kind, cells) in self.group_lines(&group, metric, &columns) {
-                add(std::mem::take(&mut title), &kind, &cells);
-            }
-        }
-        let (about, better) = (metric.about, metric.better.title());
-        out += &format!("\n{}: {about}; {better}. ", metric.title);
-        if columns.iter().any(|column| column == AVERAGE) {
-            out += "AVG is the mean over the lengths; ";
-        }
-        out += &format!("the difference is ours minus the paper's. Ours on {subject}.\n");
+        let tables = self.protocol_tables(rows).into_iter();
+        let mut out: String = tables.map(|table| table.markdown(subject) + "\n").collect();
         if !rows.is_empty() {
-            out += "\nTraining of ours:\n\n";
+            out += "## Training of ours\n\n";
         }
         for (note, models) in self.notes(rows) {
             out += &format!("- {}: {note}\n", models.join(", "));
@@ -97,88 +47,32 @@ impl Tables<'_> {
         out
     }
 
-    /// The lines of one model: what each shows, and its cells.
-    fn group_lines(
-        &self,
-        group: &Group<'_>,
-        metric: &Metric,
-        columns: &[String],
-    ) -> Vec<(String, Vec<String>)> {
-        let prints = |row: &&PrintedRow| row.values.contains_key(metric.key);
-        let paper = group.paper.filter(prints).map(|row| -> Vec<Option<f64>> {
-            let known = &self.printed.columns;
-            let value = |column: &String| row.value(metric.key, known, column);
-            columns.iter().map(value).collect()
+    /// The scores as plain text, for the terminal: a block for each metric, a line for each model,
+    /// at last the numbers of windows.
+    ///
+    /// The paper's values stand under ours where it has them and the columns are its own.
+    pub fn terminal(&self, rows: &[TableRow]) -> String {
+        let tables = self.protocol_tables(rows).into_iter();
+        let tables = tables.map(|table| match self.protocols.len() {
+            1 => table.terminal(),
+            _ => format!("{}:\n\n{}", table.counted(), table.terminal()),
         });
-        let mut lines = Vec::new();
-        if let Some(paper) = &paper {
-            lines.push(("paper".to_string(), cells(paper, false)));
-        }
-        let scores = |row: &TableRow| -> Option<Vec<Option<f64>>> {
-            let row = row.scores.as_ref()?.row(metric.key);
-            Some(our_values(row, columns))
-        };
-        let compared = |ours: &[Option<f64>], of: &TableRow| {
-            let row = of.scores.as_ref().and_then(|scores| scores.row(metric.key));
-            let same = row.is_some_and(|row| row.columns().eq(&self.printed.columns));
-            // A mean is compared only if it is over the same columns.
-            let values = ours.iter().zip(paper.as_ref()?).zip(columns);
-            let differences = values.map(|((ours, paper), column)| {
-                let compared = same || column != AVERAGE;
-                Some((*ours)? - paper.filter(|_| compared)?)
-            });
-            Some(cells(&differences.collect::<Vec<_>>(), true))
-        };
-        let absent = || vec![ABSENT.to_string(); columns.len()];
-        let by_seed = group.differ_in_seed_only();
-        for (index, row) in group.ours.iter().enumerate() {
-            let kind = match row.seed {
-                Some(seed) if by_seed => format!("ours, seed {seed}"),
-                _ if group.ours.len() > 1 => format!("ours ({})", index + 1),
-                _ => "ours".to_string(),
-            };
-            let ours = scores(row);
-            let shown = ours.as_ref().map(|ours| cells(ours, false));
-            lines.push((kind, shown.unwrap_or_else(absent)));
-            if paper.is_some() && !by_seed {
-                let difference = ours.and_then(|ours| compared(&ours, row));
-                lines.push(("difference".into(), difference.unwrap_or_else(absent)));
-            }
-        }
-        if !by_seed {
-            return lines;
-        }
-        let measured = group.ours.iter();
-        let measured = measured.filter_map(|row| Some((*row, scores(row)?)));
-        let measured: Vec<(&TableRow, Vec<Option<f64>>)> = measured.collect();
-        let spreads: Vec<Option<Spread>> = (0..columns.len())
-            .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
-            .collect();
-        let mut add = |kind: &str, text: &dyn Fn(&Spread) -> String| {
-            let spreads = spreads.iter().map(Option::as_ref);
-            let cells = spreads.map(|spread| spread.map_or(ABSENT.into(), text));
-            lines.push((kind.into(), cells.collect()));
-        };
-        add("ours, mean ± sd", &|it| {
-            format!("{:.2} ± {:.2}", it.mean, it.deviation)
-        });
-        add("ours, min to max", &|it| {
-            format!("{:.2} to {:.2}", it.least, it.most)
-        });
-        if paper.is_some() {
-            let means = spreads.iter().map(|spread| Some(spread.as_ref()?.mean));
-            let means: Vec<Option<f64>> = means.collect();
-            let of_first = measured.first().and_then(|(row, _)| compared(&means, row));
-            let cells = of_first.unwrap_or_else(absent);
-            lines.push(("difference of the mean".into(), cells));
-        }
-        lines
+        tables.collect::<Vec<String>>().join("\n")
+    }
+
+    /// A table for each protocol that has anything to show, the paper's own first.
+    fn protocol_tables<'r>(&'r self, rows: &'r [TableRow]) -> Vec<ProtocolTable<'r>> {
+        let tables = self.protocols.iter();
+        let tables = tables.map(|protocol| ProtocolTable::new(&**protocol, self.printed, rows));
+        let mut tables: Vec<ProtocolTable> = tables.filter(ProtocolTable::has_rows).collect();
+        tables.sort_by_key(|table| !table.is_compared());
+        tables
     }
 
     /// Every note of the rows once, and the models that it is about.
     fn notes<'r>(&'r self, rows: &'r [TableRow]) -> Vec<(&'r str, Vec<String>)> {
         let mut notes: Vec<(&str, Vec<String>)> = Vec::new();
-        for group in self.groups(rows) {
+        for group in groups(self.printed, rows) {
             for row in group.ours {
                 let model = match row.seed {
                     Some(seed) => format!("{} (seed {seed})", group.title),
@@ -193,174 +87,4 @@ impl Tables<'_> {
         }
         notes
     }
-
-    /// The scores as plain text, for the terminal: a block for each metric, a line for each model,
-    /// at last the numbers of windows.
-    ///
-    /// The paper's values stand under ours where it has them and the columns are its own.
-    pub fn terminal(&self, rows: &[TableRow]) -> String {
-        let columns = self.columns(rows);
-        let titles = self.metrics.iter().map(block_title);
-        let names = rows.iter().map(|row| row.name.clone());
-        let widths = titles.chain(names).map(|name| name.chars().count());
-        let width = widths.max().unwrap_or(0) + 1;
-        let line = |name: &str, cells: &[String]| {
-            let cells: String = cells.iter().map(|cell| format!("{cell:>9}")).collect();
-            format!("{name:<width$}{cells}\n")
-        };
-        let header: Vec<String> = columns.iter().map(|it| column_title(it, "")).collect();
-        let measured = rows.iter();
-        let measured = measured.filter_map(|row| Some((row, row.scores.as_ref()?)));
-        let measured: Vec<(&TableRow, &Scores)> = measured.collect();
-        let mut out = String::new();
-        for metric in self.metrics {
-            let mut rows = measured.iter().map(|(_, scores)| scores.row(metric.key));
-            if rows.all(|row| row.is_none()) {
-                continue;
-            }
-            out += &line(&block_title(metric), &header);
-            for (row, scores) in &measured {
-                let ours = our_values(scores.row(metric.key), &columns);
-                out += &line(&row.name, &cells(&ours, false));
-                let paper = self.printed.row(&row.name);
-                let paper = paper.and_then(|paper| paper.values.get(metric.key));
-                if let Some(values) = paper.filter(|_| columns == self.printed.columns) {
-                    let values: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
-                    out += &line("  paper", &cells(&values, false));
-                }
-            }
-            out.push('\n');
-        }
-        for (row, scores) in &measured {
-            let counted = columns.iter().filter(|column| *column != AVERAGE);
-            let counts = counted.map(|column| scores.windows_of(column));
-            let counts = counts.map(|count| count.map_or("-".into(), |count| count.to_string()));
-            let name = format!("windows, {}", row.name);
-            out += &line(&name, &counts.collect::<Vec<String>>());
-        }
-        out
-    }
-
-    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there
-    /// are no rows.
-    fn columns(&self, rows: &[TableRow]) -> Vec<String> {
-        let scores = rows.iter().filter_map(|row| row.scores.as_ref());
-        let rows = scores.flat_map(Scores::rows);
-        let mut columns: Vec<String> = Vec::new();
-        for column in rows.flat_map(|(_, row)| row.columns()) {
-            if !columns.iter().any(|known| known == column) {
-                columns.push(column.into());
-            }
-        }
-        if columns.is_empty() {
-            return self.printed.columns.clone();
-        }
-        columns.sort_by_key(|column| {
-            let number = column.parse::<u64>().unwrap_or(u64::MAX);
-            (number, column == AVERAGE)
-        });
-        columns
-    }
-
-    fn groups<'r>(&'r self, rows: &'r [TableRow]) -> Vec<Group<'r>> {
-        let printed = self.printed.rows.iter().map(|paper| Group {
-            title: paper.title.clone(),
-            paper: Some(paper),
-            ours: rows.iter().filter(|row| row.name == paper.name).collect(),
-        });
-        let mut groups: Vec<Group> = printed.collect();
-        let ours_alone = |row: &&TableRow| self.printed.row(&row.name).is_none();
-        for row in rows.iter().filter(ours_alone) {
-            match groups.iter_mut().find(|group| group.title == row.name) {
-                Some(group) => group.ours.push(row),
-                None => groups.push(Group {
-                    title: row.name.clone(),
-                    paper: None,
-                    ours: vec![row],
-                }),
-            }
-        }
-        groups
-    }
-}
-
-/// What heads a metric's block on the terminal.
-fn block_title(metric: &Metric) -> String {
-    format!("{} ({})", metric.title, metric.unit)
-}
-
-/// A column as a table heads it.
-fn column_title(column: &str, of_number: &str) -> String {
-    match column {
-        AVERAGE => "AVG".into(),
-        number if number.parse::<u64>().is_ok() => format!("{of_number}{number}"),
-        other => other.into(),
-    }
-}
-
-/// The scores of several seeds in one column.
-struct Spread {
-    mean: f64,
-    /// Standard deviation with n - 1; 0 for one seed.
-    deviation: f64,
-    least: f64,
-    most: f64,
-}
-
-impl Spread {
-    /// None where a seed has no score.
-    fn of(scores: impl Iterator<Item = Option<f64>>) -> Option<Self> {
-        let scores: Vec<f64> = scores.collect::<Option<_>>()?;
-        if scores.is_empty() {
-            return None;
-        }
-        let count = scores.len() as f64;
-        let mean = scores.iter().sum::<f64>() / count;
-        let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
-        Some(Self {
-            mean,
-            deviation: (squares / (count - 1.0).max(1.0)).sqrt(),
-            least: scores.iter().copied().fold(f64::INFINITY, f64::min),
-            most: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        })
-    }
-}
-
-/// A model in the tables: the paper's row and ours by its name (more than one where it was trained
-/// more than once).
-struct Group<'a> {
-    title: String,
-    paper: Option<&'a PrintedRow>,
-    ours: Vec<&'a TableRow>,
-}
-
-impl Group<'_> {
-    /// Whether these are trainings of one model on one budget with several seeds.
-    fn differ_in_seed_only(&self) -> bool {
-        let Some((first, others)) = self.ours.split_first() else {
-            return false;
-        };
-        let seeds: BTreeSet<_> = self.ours.iter().filter_map(|row| row.seed).collect();
-        // A row that is not trained yet has no note of its budget.
-        let measured = |row: &TableRow| row.scores.is_some();
-        let same = |row: &&TableRow| {
-            !measured(first) || !measured(row) || row.schedule_note == first.schedule_note
-        };
-        !others.is_empty() && seeds.len() == self.ours.len() && others.iter().all(same)
-    }
-}
-
-/// Our scores in these columns.
-fn our_values(row: Option<&ScoreRow>, columns: &[String]) -> Vec<Option<f64>> {
-    let value = |column: &String| row.and_then(|row| row.at(column));
-    columns.iter().map(value).collect()
-}
-
-fn cells(values: &[Option<f64>], signed: bool) -> Vec<String> {
-    let text = |value: &Option<f64>| match value {
-        None => "-".to_string(),
-        Some(value) if signed => format!("{value:+.2}"),
-        Some(value) => format!("{value:.2}"),
-    };
-    values.iter().map(text).collect()
 }

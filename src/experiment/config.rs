@@ -120,9 +120,9 @@ impl Default for ValidationConfig {
 
 impl ExperimentConfig {
     /// How the model's tables score it.
-    pub fn protocol(&self) -> Box<dyn Protocol> {
+    pub fn protocols(&self) -> Vec<Box<dyn Protocol>> {
         self.model
-            .protocol(&self.data, &EvaluationOptions::default())
+            .protocols(&self.data, &EvaluationOptions::default())
     }
 
     /// What the paper of its model prints.

@@ -26,7 +26,7 @@ impl EvaluatedRun {
         let runs = folders.iter().map(|folder| Self::read(folder));
         let runs: Vec<Self> = runs.collect::<Result<_, _>>()?;
         for pair in runs.windows(2) {
-            let [ours, theirs] = [&pair[0], &pair[1]].map(Self::measured);
+            let [ours, theirs] = [pair[0].measured(&pair[1]), pair[1].measured(&pair[0])];
             // Scores stand side by side only if they were measured on the same windows.
             if ours != theirs {
                 return Err(ReproduceError::Refused(format!(
@@ -63,12 +63,18 @@ impl EvaluatedRun {
         }
     }
 
-    /// On what, in words.
-    fn measured(&self) -> String {
+    /// On what, in words; by the protocols that both were scored by.
+    fn measured(&self, other: &Self) -> String {
         let data = &self.record.data;
-        let windows: BTreeMap<_, _> = self.record.scores.windows().iter().cloned().collect();
+        let scores = self.record.scores.iter();
+        let shared = scores.filter(|(protocol, _)| other.record.scores.by(protocol).is_some());
+        let windows = shared.map(|(protocol, scores)| {
+            let by_length: BTreeMap<_, _> = scores.windows().iter().cloned().collect();
+            format!("{by_length:?} by {protocol}")
+        });
+        let windows = windows.collect::<Vec<_>>().join(", ");
         format!(
-            "on {} test clips ({} frames, windows by length {windows:?}) of data with digest {}",
+            "on {} test clips ({} frames, windows by length {windows}) of data with digest {}",
             data.clips, data.frames, data.data_digest
         )
     }

@@ -284,8 +284,9 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     let groups = config.model.rate_groups();
     let rates = &mut config.optimiser.rates;
     rates.retain(|group, _| groups.contains(&group.as_str()));
-    let protocol = config.protocol();
+    let protocols = config.protocols();
     if let Some(validation) = &mut config.validation
+        && let Some(protocol) = protocols.first()
         && validation.lengths.is_none()
     {
         let lengths = protocol.lengths();

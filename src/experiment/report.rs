@@ -67,13 +67,14 @@ impl Reproduction<'_> {
         };
         let table_rows: Vec<TableRow> = rows.iter().map(Reported::table_row).collect();
         let (out, printed) = (self.out, self.printed);
-        let protocol = rows[0].row.config.protocol();
-        let metrics = protocol.metrics();
-        let text = Tables { metrics, printed }.markdown(&table_rows, &record.data.caption());
+        let protocols = &rows[0].row.config.protocols();
+        let text = Tables { protocols, printed }.markdown(&table_rows, &record.data.caption());
         let mut files: Vec<PathBuf> = vec![out.join(TABLES)];
         replace_file(&files[0], text)?;
-        if let Some(metric) = metrics.first()
-            && let Some(drawn) = score_figure(metric, printed, &table_rows)?
+        let mut compared = protocols.iter();
+        if let Some(protocol) = compared.find(|protocol| printed.compares(protocol.name()))
+            && let Some(metric) = protocol.metrics().first()
+            && let Some(drawn) = score_figure(protocol.name(), metric, printed, &table_rows)?
         {
             let figure = out.join(metric.key).with_extension("svg");
             replace_file(&figure, drawn)?;

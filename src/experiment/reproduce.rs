@@ -11,7 +11,7 @@ use super::ReproduceError;
 use super::results::RowResults;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, Scores};
+use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, ProtocolScores};
 use crate::models::Generator;
 use crate::run::{Manifest, RunFolder, RunState};
 use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError, pool};
@@ -196,17 +196,31 @@ impl Reproduction<'_> {
     /// Trains and evaluates what is left of a row.
     fn finish(&self, row: &Row) -> Result<(), ReproduceError> {
         let results = RowResults::of(row, self.out);
-        if results.read(row, self.dataset)?.is_some() {
+        let run = self.run_of(row);
+        let finished = is_finished(run.manifest()?.as_ref());
+        if let Some(record) = results.read(row, self.dataset)? {
+            let protocols = row.config.protocols().into_iter();
+            let names = protocols.map(|protocol| protocol.name());
+            let missing: Vec<&str> = names.filter(|it| record.scores.by(it).is_none()).collect();
             let folder = self.out.join(&row.folder);
-            let note = format!("done, see {}", folder.display());
-            return Ok(self.observer.note(&note)?);
+            let folder = folder.display();
+            if missing.is_empty() {
+                return Ok(self.observer.note(&format!("done, see {folder}"))?);
+            }
+            // Scores of a training that is gone stay; to train it again is for the user to ask.
+            if row.is_trained() && !finished {
+                let (missing, runs) = (missing.join(", "), self.runs.display());
+                return Ok(self.observer.note(&format!(
+                    "done, see {folder}, but not scored by {missing}: {runs} has no run of it; \
+                     remove the folder to train it again"
+                ))?);
+            }
         }
         if let Some(model) = row.config.model.untrained(&row.config.data) {
             let scores = self.evaluate(row, &*model)?;
             return results.write(row, None, scores, self.dataset);
         }
-        let run = self.run_of(row);
-        if !is_finished(run.manifest()?.as_ref()) {
+        if !finished {
             if self.no_training {
                 return Ok(self.observer.note("not trained yet")?);
             }
@@ -234,15 +248,18 @@ impl Reproduction<'_> {
         Ok(outcome?)
     }
 
-    fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<Scores, ReproduceError> {
+    fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<ProtocolScores, ReproduceError> {
         let pool = pool(self.threads)?;
-        let protocol = row.config.protocol();
-        let evaluation =
-            pool.install(|| self.observer.evaluate(&*protocol, model, self.dataset))?;
-        for warning in &evaluation.warnings {
-            self.observer.warning(warning);
+        let mut scores = Vec::new();
+        for protocol in row.config.protocols() {
+            let evaluation =
+                pool.install(|| self.observer.evaluate(&*protocol, model, self.dataset))?;
+            for warning in &evaluation.warnings {
+                self.observer.warning(warning);
+            }
+            scores.push((protocol.name(), evaluation.scores));
         }
-        Ok(evaluation.scores)
+        Ok(ProtocolScores::new(scores))
     }
 }
 

@@ -7,7 +7,7 @@ use super::ReproduceError;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::scores::AVERAGE;
-use crate::evaluation::{EvaluatedData, EvaluationRecord, Scores};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, ProtocolScores};
 use crate::report::{LossSeries, loss_curve, thousands, validation_curve};
 use crate::run::{FileError, LogLine, RunFolder, replace_file};
 
@@ -73,7 +73,7 @@ impl RowResults {
         &self,
         row: &Row,
         run: Option<&RunFolder>,
-        scores: Scores,
+        scores: ProtocolScores,
         dataset: &Dataset,
     ) -> Result<(), ReproduceError> {
         let path = self.folder.path();
@@ -116,8 +116,8 @@ impl RowResults {
         let Some(scores) = scored.next() else {
             return Ok(());
         };
-        let protocol = row.config.protocol();
-        let mut metrics = protocol.metrics().iter();
+        let protocols = row.config.protocols();
+        let mut metrics = protocols.iter().flat_map(|protocol| protocol.metrics());
         let found = metrics.find_map(|metric| Some((metric, scores.row(metric.key)?)));
         let Some((metric, row)) = found else {
             return Ok(());

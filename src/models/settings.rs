@@ -120,8 +120,8 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// The model, where it needs no training.
     fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>>;
 
-    /// How its tables score a model.
-    fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol>;
+    /// How its tables score a model. The first protocol also scores a training on validation clips.
+    fn protocols(&self, data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>>;
 
     /// Compares the gradient of its loss with central differences, in f64 and, unless `full_size`,
     /// in small sizes. A title and a report for each way to compute the loss.

@@ -16,6 +16,8 @@ use super::velocity_factor::velocity_factors;
 pub const BODY_POSITIONS: Range<usize> = 0..69;
 /// p^r: the root's position in the world, cm.
 pub const ROOT_POSITION: Range<usize> = 69..72;
+/// p^b and p^r together, whose differences are the velocities.
+pub const POSITIONS: Range<usize> = BODY_POSITIONS.start..ROOT_POSITION.end;
 /// o^r: the facing angle about Y that was turned away, rad.
 pub const FACING: Range<usize> = 72..73;
 /// c: contact labels of LeftFoot, LeftToeBase, RightFoot, RightToeBase.

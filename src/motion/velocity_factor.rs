@@ -1,20 +1,14 @@
 //! Velocity factors: how fast each of the five body parts moves (eq. 1).
 
-use std::ops::Range;
-
 use ndarray::{ArrayView1, ArrayView2};
 
-use super::features::{BODY_POSITIONS, FACING};
+use super::features::POSITIONS;
 
 /// Number of body parts (M = 5).
 pub const PARTS: usize = 5;
 
 /// Names of the body parts, in the order of every velocity factor.
 pub const PART_NAMES: [&str; PARTS] = ["trunk", "left_leg", "right_leg", "right_arm", "left_arm"];
-
-/// p^b and p^r together, the 72 numbers whose differences are the velocities: they stand side by
-/// side in a frame.
-const POSITIONS: Range<usize> = BODY_POSITIONS.start..FACING.start;
 
 /// Joint weights of each body part (figure 4): `(joint of the dance skeleton, weight)`.
 ///

@@ -165,7 +165,8 @@ impl RunLine {
             self.cells[11] = version(&data.version, data.commit.as_deref());
         }
         for (cell, length) in self.cells[7..].iter_mut().zip(LENGTHS) {
-            if let Some(score) = scores.row("lrp").and_then(|row| row.at(length)) {
+            let mut protocols = scores.iter();
+            if let Some(score) = protocols.find_map(|(_, scores)| scores.row("lrp")?.at(length)) {
                 *cell = format!("{score:.1}");
             }
         }

@@ -59,7 +59,7 @@ pub(super) fn metric_axis(metric: &Metric) -> String {
     format!("{} ({}), {better}", metric.title, metric.unit)
 }
 
-/// The figure of the rows' scores on test clips, SVG: the mean over a model's seeds, and of the
+/// The figure of the rows' scores by a protocol on test clips, SVG: the mean over a model's seeds, and of the
 /// rows that the paper's file names the printed ones.
 ///
 /// None where no column is a number that scores could be drawn over.
@@ -67,19 +67,25 @@ pub(super) fn metric_axis(metric: &Metric) -> String {
 /// # Errors
 /// A score is not finite.
 pub fn score_figure(
+    protocol: &str,
     metric: &Metric,
     printed: &PrintedTables,
     rows: &[TableRow],
 ) -> Result<Option<String>, FigureError> {
     let title = format!("{} on the test clips; dashed: the paper's", metric.title);
-    let series = series(metric, printed, rows);
+    let series = series(protocol, metric, printed, rows);
     match series.iter().all(|series| series.ours.is_empty()) {
         true => Ok(None),
         false => score_curve(&title, metric, &series).map(Some),
     }
 }
 
-fn series(metric: &Metric, printed: &PrintedTables, rows: &[TableRow]) -> Vec<ScoreSeries> {
+fn series(
+    protocol: &str,
+    metric: &Metric,
+    printed: &PrintedTables,
+    rows: &[TableRow],
+) -> Vec<ScoreSeries> {
     let of_paper = |row: &PrintedRow| -> Vec<(f64, f64)> {
         let values = row.values.get(metric.key).into_iter().flatten();
         let columns = printed.columns.iter().map(String::as_str);
@@ -93,7 +99,7 @@ fn series(metric: &Metric, printed: &PrintedTables, rows: &[TableRow]) -> Vec<Sc
             continue;
         }
         let seeds = rows.iter().filter(|other| other.name == row.name);
-        let scores = seeds.filter_map(|seed| seed.scores.as_ref()?.row(metric.key));
+        let scores = seeds.filter_map(|seed| seed.scores.as_ref()?.by(protocol)?.row(metric.key));
         let seeds: Vec<&ScoreRow> = scores.collect();
         let Some(first) = seeds.first() else {
             continue;

@@ -30,7 +30,14 @@ impl<'d> Validation<'d> {
             lengths: asked.lengths.clone().unwrap_or_default(),
             most_windows: Some(asked.windows),
         };
-        let protocol = config.model.protocol(&config.data, &options);
+        let mut protocols = config.model.protocols(&config.data, &options).into_iter();
+        let protocol = protocols.next().ok_or_else(|| {
+            let kind = config.model.kind();
+            TrainingError::Refused(format!(
+                "model.kind = {kind} has no protocol to score validation clips by; leave \
+                 [validation] out"
+            ))
+        })?;
         let frames = DataPart::Validation.of(dataset)?.iter();
         let longest = frames.map(Recording::frames).max().unwrap_or(0);
         let mut lengths = protocol.lengths().iter();

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use keydance::evaluation::{ScoreRow, Scores};
+use keydance::evaluation::{ProtocolScores, ScoreRow, Scores};
 use keydance::motion::bvh;
 use keydance::report::demo::Comparison;
 use predicates::prelude::PredicateBooleanExt as _;
@@ -35,7 +35,11 @@ fn the_reduced_demo_ends_ahead_of_what_needs_no_training_and_writes_every_result
             .and(contains("N = 150: model")),
     );
 
-    let lrp = |file: &str, length: &str| json(&out.join(file))["lrp"][length].as_f64().unwrap();
+    let lrp = |file: &str, length: &str| {
+        json(&out.join(file))["equations"]["lrp"][length]
+            .as_f64()
+            .unwrap()
+    };
     for length in ["100", "150"] {
         let model = lrp("evaluation.json", length);
         for other in ["interpolation.json", "untrained.json"] {
@@ -48,8 +52,8 @@ fn the_reduced_demo_ends_ahead_of_what_needs_no_training_and_writes_every_result
     }
     let tables = fs::read_to_string(out.join("tables.md")).unwrap();
     for words in [
-        "## Table 2",
-        "## Table 4",
+        "## LRP by `equations`",
+        "## ART by `equations`",
         "generated clips",
         &format!("{:.2}", lrp("evaluation.json", "150")),
         &format!("{:.2}", lrp("interpolation.json", "avg")),
@@ -103,9 +107,10 @@ fn another_run_is_not_overwritten_and_a_wrong_fraction_is_named() {
     assert!(!folder.path().join("new").exists());
 }
 
-fn scores(lrp: [f64; 2]) -> Scores {
+fn scores(lrp: [f64; 2]) -> ProtocolScores {
     let row = ScoreRow::new([100, 150].into_iter().zip(lrp));
-    Scores::new([("lrp", row)], [100, 150].map(|length| (length, 1)))
+    let scores = Scores::new([("lrp", row)], [100, 150].map(|length| (length, 1)));
+    ProtocolScores::new([("equations", scores)])
 }
 
 #[test]

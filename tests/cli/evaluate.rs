@@ -51,16 +51,16 @@ fn the_json_has_every_score_at_every_length_and_their_averages() {
         .assert()
         .success()
         .stdout(contains("LRP (cm)").and(contains("2 test clips, 360 frames")));
-    let scores = json(&file);
+    let both = json(&file);
+    let scores = &both["equations"];
     let keys = |value: &Value| -> Vec<String> {
         let mut keys: Vec<String> = value.as_object().unwrap().keys().cloned().collect();
         keys.sort_unstable();
         keys
     };
-    assert_eq!(
-        keys(&scores),
-        ["art", "avf", "foot_skate", "lrp", "windows"]
-    );
+    assert_eq!(keys(&both), ["equations", "published"]);
+    assert_eq!(keys(scores), ["art", "avf", "foot_skate", "lrp", "windows"]);
+    assert_eq!(keys(&both["published"]), ["art", "avf", "lrp", "windows"]);
     assert_eq!(keys(&scores["windows"]), ["10", "100", "150", "50"]);
     // Starts every ceil(0.1 (N + 1)) frames in two clips of 180.
     for (length, windows) in [
@@ -155,7 +155,7 @@ fn change_weights(run: &Path, change: impl Fn(&mut HashMap<String, (Vec<usize>, 
 fn the_statistics_are_those_of_the_weights_file() {
     let run = copied_run();
     let lrp = || {
-        json(&run.path().join("evaluation.json"))["lrp"]["avg"]
+        json(&run.path().join("evaluation.json"))["equations"]["lrp"]["avg"]
             .as_f64()
             .unwrap()
     };
@@ -338,6 +338,7 @@ fn tables_set_runs_beside_the_paper_and_say_their_budget() {
     let digest = manifest["data_digest"].as_str().unwrap();
     for words in [
         "## Table 2: LRP",
+        "## foot skate by `equations`",
         "needs no training",
         "schedule.fraction 0.05",
         "seed 1",
@@ -345,7 +346,7 @@ fn tables_set_runs_beside_the_paper_and_say_their_budget() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let lrp = json(&interpolation.join("evaluation.json"))["lrp"]["150"]
+    let lrp = json(&interpolation.join("evaluation.json"))["published"]["lrp"]["150"]
         .as_f64()
         .unwrap();
     let difference = format!("{:+.2}", lrp - 124.47);
@@ -395,7 +396,7 @@ fn clips_other_than_the_test_clips_are_named_in_the_json_and_have_files_of_their
     of_validation.stdout(contains("on 1 validation clips, 180 frames"));
     let scores = json(&file);
     assert_eq!(scores["clips"], "validation");
-    assert!(scores["lrp"]["avg"].is_number());
+    assert!(scores["equations"]["lrp"]["avg"].is_number());
     let folder = out.path().join("scores");
     assert_eq!(json(&folder.join("evaluation_validation.json")), scores);
     let data = json(&folder.join("evaluation_validation_data.json"));
@@ -437,7 +438,7 @@ fn lengths_of_ones_own_are_scored_each_once() {
         .arg(&file)
         .assert()
         .success();
-    let scores = json(&file);
+    let scores = &json(&file)["equations"];
     let lengths: Vec<&String> = scores["windows"].as_object().unwrap().keys().collect();
     assert_eq!(lengths.len(), 2);
     let lrp = |key: &str| scores["lrp"][key].as_f64().unwrap();
@@ -447,6 +448,32 @@ fn lengths_of_ones_own_are_scored_each_once() {
         .assert()
         .failure()
         .stderr(contains("--lengths"));
+}
+
+#[test]
+fn a_cheap_evaluation_says_so_and_leaves_a_runs_scores_alone() {
+    let run = copied_run();
+    let file = run.path().join("cheap.json");
+    let cheap = |options: &[&str]| {
+        let mut command = evaluate(run.path());
+        command.args(options).arg("--json").arg(&file);
+        command.assert()
+    };
+    let said = contains("at most 3 windows of each length").and(contains("By `equations`").not());
+    let options = [
+        "--windows",
+        "3",
+        "--lengths",
+        "10,50",
+        "--protocol",
+        "published",
+    ];
+    cheap(&options).success().stdout(said);
+    let windows = &json(&file)["published"]["windows"];
+    assert_eq!((&windows["10"], &windows["50"]), (&3.into(), &3.into()));
+    assert!(!run.path().join("evaluation.json").exists());
+    let unknown = cheap(&["--protocol", "mine"]).failure();
+    unknown.stderr(contains("--protocol mine").and(contains("equations, published")));
 }
 
 #[test]
@@ -465,7 +492,7 @@ fn a_run_is_scored_with_its_predictions_refined_too_and_keeps_only_the_scores_of
     assert!(!kept.exists());
     let plain = scored(false);
     assert_eq!(json(&kept), plain);
-    let share = |scores: &Value| scores["avf"]["avg"].as_f64().unwrap();
+    let share = |scores: &Value| scores["equations"]["avf"]["avg"].as_f64().unwrap();
     assert!(share(&refined) > share(&plain), "{refined} {plain}");
     evaluate(run.path())
         .args(["--set", "model.heads=1"])
@@ -506,10 +533,21 @@ fn interpolation_on_the_dance_data_has_the_known_scores() {
         .arg(&file)
         .assert()
         .success();
-    let lrp = &json(&file)["lrp"];
+    let scores = json(&file);
+    let lrp = |protocol: &str, length: &str| scores[protocol]["lrp"][length].as_f64().unwrap();
     for (length, known) in [("10", 22.8508), ("50", 95.8121)] {
-        let found = lrp[length].as_f64().unwrap();
+        let found = lrp("equations", length);
         assert!((found - known).abs() < 1e-4, "N = {length}: {found}");
+    }
+    // By another implementation, printed to a hundredth.
+    for (length, known) in [
+        ("10", 17.80),
+        ("50", 93.11),
+        ("100", 115.26),
+        ("150", 123.29),
+    ] {
+        let found = lrp("published", length);
+        assert!((found - known).abs() < 5e-3, "N = {length}: {found}");
     }
 }
 
@@ -587,7 +625,12 @@ fn runs_are_listed_with_state_progress_speed_scores_and_version() {
     let manifest = json(&run.path().join("manifest.json"));
     let steps = format!("{0}/{0}", manifest["steps"]);
     let scores = json(&run.path().join("evaluation.json"));
-    let lrp = |length: &str| format!("{:.1}", scores["lrp"][length].as_f64().unwrap());
+    let lrp = |length: &str| {
+        format!(
+            "{:.1}",
+            scores["equations"]["lrp"][length].as_f64().unwrap()
+        )
+    };
     let evaluated = &lines[2];
     assert_eq!(evaluated[1..5], ["small", "finished", &steps, "100"]);
     assert!(evaluated[6].parse::<f64>().unwrap() > 0.0, "{evaluated:?}");

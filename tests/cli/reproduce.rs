@@ -462,3 +462,28 @@ fn a_key_of_one_model_reaches_only_the_rows_that_know_it() {
         .failure()
         .stderr(contains("--set model.loss.key=0").and(contains("interpolation.toml")));
 }
+
+#[test]
+fn scores_that_lack_a_protocol_are_made_again_from_the_run_and_stay_where_it_is_gone() {
+    let place = TempDir::new().unwrap();
+    copy(REPRODUCED.path(), place.path());
+    let scores = place.path().join("results/whole_model/evaluation.json");
+    let mut earlier = json(&scores);
+    earlier.as_object_mut().unwrap().remove("published");
+    fs::write(&scores, earlier.to_string()).unwrap();
+    let runs = place.path().join("runs");
+    fs::rename(&runs, place.path().join("away")).unwrap();
+    let kept = reproduce(place.path()).arg("--no-training").assert();
+    let note = contains("not scored by published").and(contains("has no run of it"));
+    kept.success().stdout(note);
+    assert_eq!(json(&scores), earlier);
+    assert_eq!(lrp_lines(place.path(), "Whole model").len(), 1);
+    fs::rename(place.path().join("away"), &runs).unwrap();
+    reproduce(place.path()).assert().success();
+    let before = json(
+        &REPRODUCED
+            .path()
+            .join("results/whole_model/evaluation.json"),
+    );
+    assert_eq!(json(&scores), before);
+}

@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::evaluation::equations::window_request;
+use keydance::evaluation::transitions::window_request;
 use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::TransitionModel;
 use keydance::models::transition::window_features;

@@ -6,7 +6,8 @@ use std::fs;
 use assert_cmd::Command;
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::evaluation::equations::{window_request, window_scores};
+use keydance::evaluation::equations::window_scores;
+use keydance::evaluation::transitions::window_request;
 use keydance::models::baselines::linear_positions::LinearPositions;
 use keydance::models::baselines::zero_velocity::ZeroVelocity;
 use keydance::models::transition::DanceClip;
@@ -184,8 +185,8 @@ fn their_configs_are_evaluated_through_the_binary_and_are_not_trained() {
             .stdout(contains(name));
         let scores = fs::read_to_string(out.join("evaluation.json")).unwrap();
         let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
-        assert_eq!(scores["art"]["avg"], 1.0);
-        lrp.push(scores["lrp"]["10"].as_f64().unwrap());
+        assert_eq!(scores["equations"]["art"]["avg"], 1.0);
+        lrp.push(scores["equations"]["lrp"]["10"].as_f64().unwrap());
         keydance("train", &config)
             .arg("--out")
             .arg(folder.path().join("run"))

@@ -642,9 +642,15 @@ fn the_papers_config_trains_and_is_evaluated_through_the_binary() {
     .stdout(contains("LRP (cm)"));
     let scores = fs::read_to_string(path("scores.json")).unwrap();
     let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
-    assert!(scores["lrp"]["150"].as_f64().unwrap() > 1.0, "{scores}");
+    assert!(
+        scores["equations"]["lrp"]["150"].as_f64().unwrap() > 1.0,
+        "{scores}"
+    );
     // Nothing holds the root to the trajectory.
-    assert!(scores["art"]["150"].as_f64().unwrap() < 1.0, "{scores}");
+    assert!(
+        scores["equations"]["art"]["150"].as_f64().unwrap() < 1.0,
+        "{scores}"
+    );
 }
 
 #[test]

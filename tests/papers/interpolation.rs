@@ -7,6 +7,7 @@ use glam::{DQuat, DVec3};
 use keydance::data::{DataConfig, DataPart, Dataset};
 use keydance::evaluation::Protocol as _;
 use keydance::evaluation::equations::Equations;
+use keydance::evaluation::transitions::TransitionScoring;
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::{KeyframePose, Transition, TransitionModel, TransitionRequest};
@@ -261,10 +262,10 @@ fn scores_on_the_dance_test_clips_are_those_of_an_independent_implementation() {
         return;
     };
     let data = Dataset::load(&folder, &DataConfig::default()).unwrap();
-    let protocol = Equations {
+    let protocol = Equations(TransitionScoring {
         lengths: vec![10, 50],
-        ..Equations::default()
-    };
+        ..TransitionScoring::default()
+    });
     let model = Interpolation::default();
     let evaluation = protocol.evaluate(&model, &data, DataPart::Test).unwrap();
     let scores = evaluation.scores;

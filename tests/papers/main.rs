@@ -22,6 +22,7 @@ mod metrics;
 mod pan2021;
 mod preferred;
 mod prior;
+mod published;
 mod ranges;
 mod root_frame;
 mod schedule;

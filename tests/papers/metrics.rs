@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use keydance::evaluation::equations::{Equations, WindowScores, foot_skate, means, window_scores};
+use keydance::evaluation::transitions::TransitionScoring;
 use keydance::evaluation::{EvaluationError, ScoreRow, Scores};
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;
@@ -276,11 +277,11 @@ fn clips() -> Vec<DanceClip> {
 #[test]
 fn a_model_that_knows_the_answer_scores_0_1_1_and_a_shifted_one_misses_the_root() {
     let clips = clips();
-    let protocol = Equations {
+    let protocol = Equations(TransitionScoring {
         lengths: vec![10, 30],
         chunk: 3,
-        ..Equations::default()
-    };
+        ..TransitionScoring::default()
+    });
     for (root_shift, art) in [(0.0, 1.0), (6.9, 1.0), (7.0, 0.0), (-8.0, 0.0)] {
         let oracle = oracle(&clips, root_shift);
         let evaluation = protocol.evaluate_clips(&oracle, &clips).unwrap();
@@ -302,11 +303,11 @@ fn a_model_that_knows_the_answer_scores_0_1_1_and_a_shifted_one_misses_the_root(
 #[test]
 fn scores_are_the_same_bits_on_any_number_of_threads() {
     let clips = clips();
-    let protocol = Equations {
+    let protocol = Equations(TransitionScoring {
         lengths: vec![10],
         chunk: 4,
-        ..Equations::default()
-    };
+        ..TransitionScoring::default()
+    });
     let scores = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -358,9 +359,11 @@ impl TransitionModel for Wrong {
 #[test]
 fn a_length_of_0_and_a_model_that_fails_are_errors_that_say_where() {
     let clips = clips();
-    let lengths = |lengths: &[usize]| Equations {
-        lengths: lengths.to_vec(),
-        ..Equations::default()
+    let lengths = |lengths: &[usize]| {
+        Equations(TransitionScoring {
+            lengths: lengths.to_vec(),
+            ..TransitionScoring::default()
+        })
     };
     let fails = Wrong(|_| {
         Err(ModelError::NotFinite {
@@ -371,7 +374,7 @@ fn a_length_of_0_and_a_model_that_fails_are_errors_that_say_where() {
         let error = protocol.evaluate_clips(model, clips).unwrap_err();
         format!("{:#}", anyhow::Error::from(error))
     };
-    assert!(text(lengths(&[0]), &fails, &clips).contains("0 frames"));
+    assert!(text(lengths(&[0]), &fails, &clips).contains("length 0"));
     let found = text(lengths(&[5]), &fails, &clips);
     let of_a_clip = clips.iter().any(|clip| found.contains(&clip.name));
     assert!(

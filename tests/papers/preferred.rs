@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use keydance::autograd::{Tape, Workspace};
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::evaluation::equations::window_request;
+use keydance::evaluation::transitions::window_request;
 use keydance::models::pan2021::Pan2021Config;
 use keydance::models::transition::DanceClip;
 use keydance::models::transition::{

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use glam::{DQuat, DVec3};
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::evaluation::equations::window_request;
+use keydance::evaluation::transitions::window_request;
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::DanceClip;

@@ -1,7 +1,10 @@
 //! Tables 2 to 4: the paper's values, ours and the difference.
 
 use keydance::evaluation::equations::Equations;
-use keydance::evaluation::{PrintedTables, Protocol as _, ScoreRow, Scores, TableRow, Tables};
+use keydance::evaluation::published::Published;
+use keydance::evaluation::{
+    PrintedTables, Protocol, ProtocolScores, ScoreRow, Scores, TableRow, Tables,
+};
 use keydance::models::pan2021::PAPER;
 
 /// The transition lengths of the paper's tables, frames.
@@ -20,7 +23,10 @@ fn row(name: &str, lengths: &[usize], lrp: &[f64], share: f64, note: &str) -> Ta
     TableRow {
         name: name.into(),
         seed: None,
-        scores: Some(Scores::new(rows, windows)),
+        scores: Some(ProtocolScores::new([(
+            "published",
+            Scores::new(rows, windows),
+        )])),
         schedule_note: note.into(),
     }
 }
@@ -34,10 +40,13 @@ fn terminal(rows: &[TableRow]) -> String {
 }
 
 fn in_tables(show: impl FnOnce(Tables<'_>) -> String) -> String {
-    let (protocol, printed) = (Equations::default(), printed());
+    let protocols: [Box<dyn Protocol>; 2] = [
+        Box::new(Equations::default()),
+        Box::new(Published::default()),
+    ];
     show(Tables {
-        metrics: protocol.metrics(),
-        printed: &printed,
+        protocols: &protocols,
+        printed: &printed(),
     })
 }
 
@@ -130,12 +139,9 @@ fn a_model_of_the_paper_has_its_value_ours_and_the_difference() {
         lines(&art, "Whole model")[0][2..],
         ["0.86", "0.85", "0.80", "0.72", "0.81"]
     );
+    assert!(art.contains("- Whole model: 0.002 of the schedule"));
     for table in [&lrp, &avf, &art] {
-        assert!(
-            table.contains("- Whole model: 0.002 of the schedule"),
-            "{table}"
-        );
-        assert!(table.contains("Ours on 3 clips"));
+        assert!(table.contains("Ours on 3 clips") && table.contains("By `published`"));
         assert_eq!(
             lines(table, "Condition-FC").len(),
             1,
@@ -208,7 +214,7 @@ fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
         seeded(2, [31.0, 50.0, 60.0, 70.0]),
         seeded(3, [35.0, 50.0, 60.0, 70.0]),
     ];
-    let [lrp, ..] = tables(&rows);
+    let [lrp, _, end] = tables(&rows);
     let found = lines(&lrp, "Whole model");
     let expected = [
         ["paper", "27.07"],
@@ -224,7 +230,7 @@ fn seeds_of_one_model_have_their_mean_spread_and_the_difference_of_the_mean() {
     }
     assert_eq!(found[4][3], "50.00 ± 0.00");
     let note = "- Whole model (seed 1), Whole model (seed 2), Whole model (seed 3): short";
-    assert!(lrp.contains(note), "{lrp}");
+    assert!(end.contains(note), "{end}");
     // A seed that is still missing leaves its line, and the spread of the others.
     rows[1].scores = None;
     rows[1].schedule_note = "not trained yet".into();
@@ -240,13 +246,13 @@ fn a_model_that_is_not_trained_yet_keeps_its_row() {
         scores: None,
         ..row("condition_fc", &LENGTHS, &[0.0; 4], 0.5, "not trained yet")
     };
-    let [lrp, avf, _] = tables(&[absent]);
+    let [lrp, avf, end] = tables(&[absent]);
     for table in [&lrp, &avf] {
         let found = lines(table, "Condition-FC");
         assert_eq!(found[1][1..3], ["ours", "—"]);
         assert_eq!(found[2][1..3], ["difference", "—"]);
-        assert!(table.contains("- Condition-FC: not trained yet"), "{table}");
     }
+    assert!(end.contains("- Condition-FC: not trained yet"), "{end}");
 }
 
 #[test]
@@ -277,9 +283,37 @@ fn the_terminal_shows_all_three_scores_and_the_windows() {
     assert_eq!(cells("windows, interpolation"), ["100", "20", "10", "6"]);
     for score in [
         "LRP (cm)",
-        "AVF (share of windows)",
-        "ART (share of windows)",
+        "AVF (share of velocity factors)",
+        "ART (share of frames)",
     ] {
         assert_eq!(cells(score), ["10", "50", "100", "150", "AVG"]);
     }
+}
+
+#[test]
+fn scores_by_another_protocol_stand_in_tables_of_their_own_without_the_papers_numbers() {
+    let of = |name: &str, protocol: &'static str, lrp: [f64; 4]| {
+        let whole = row(name, &LENGTHS, &lrp, 0.5, "short");
+        let scores = whole.scores.as_ref().unwrap().by("published").unwrap();
+        let scores = ProtocolScores::new([(protocol, scores.clone())]);
+        TableRow {
+            scores: Some(scores),
+            ..whole
+        }
+    };
+    let rows = [
+        of("whole_model", "published", [30.0, 50.0, 60.0, 70.0]),
+        of("one_lstm", "equations", [40.0; 4]),
+    ];
+    let text = markdown(&rows, "3 clips");
+    let (compared, own) = text.split_once("## LRP by `equations`").unwrap();
+    assert_eq!(lines(compared, "Whole model").len(), 3);
+    assert_eq!(lines(compared, "One LSTM").len(), 1, "the paper's alone");
+    assert_eq!(
+        lines(own, "One LSTM"),
+        [[
+            "One LSTM", "ours", "40.00", "40.00", "40.00", "40.00", "40.00"
+        ]]
+    );
+    assert!(!own.contains("Whole model |") && !own.contains("the paper's."));
 }

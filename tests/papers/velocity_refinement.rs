@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
-use keydance::evaluation::equations::window_request;
+use keydance::evaluation::transitions::window_request;
 use keydance::models::transition::DanceClip;
 use keydance::models::transition::TransitionRequest;
 use keydance::models::transition::velocity_refinement;

@@ -114,7 +114,7 @@ fn it_is_evaluated_by_its_own_metrics_and_generates_from_a_seed() {
     let data = dataset(&config);
     let (path, _) = trained(folder.path(), &config, &data);
     let subject = Subject::open(&path, &[]).unwrap();
-    let protocol = subject.config.protocol();
+    let protocol = subject.config.protocols().remove(0);
     let evaluate = |model| protocol.evaluate(model, &data, DataPart::Test).unwrap();
     let scores = evaluate(&*subject.model).scores;
     let untrained = Trainer::new(config, &data, 1).unwrap().model();
@@ -204,7 +204,8 @@ fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {
     };
     assert!(matches!(reproduction.run().unwrap(), Ending::Finished));
     let record = EvaluationRecord::read(&out.join("toy")).unwrap();
-    let ours = record.scores.row("nll").unwrap().at("all").unwrap();
+    let scores = record.scores.by("likelihood").unwrap();
+    let ours = scores.row("nll").unwrap().at("all").unwrap();
     let tables = fs::read_to_string(out.join("tables.md")).unwrap();
     for line in [
         "## Table 1: NLL".to_string(),

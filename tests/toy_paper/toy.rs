@@ -135,8 +135,8 @@ impl ModelSettings for Toy {
         None
     }
 
-    fn protocol(&self, _data: &DataConfig, _options: &EvaluationOptions) -> Box<dyn Protocol> {
-        Box::new(ToyProtocol)
+    fn protocols(&self, _: &DataConfig, _: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
+        vec![Box::new(ToyProtocol)]
     }
 
     fn check_gradients(
@@ -422,6 +422,14 @@ const METRICS: [Metric; 2] = [
 ];
 
 impl Protocol for ToyProtocol {
+    fn name(&self) -> &'static str {
+        "likelihood"
+    }
+
+    fn about(&self) -> &'static str {
+        "of the first frames of each clip"
+    }
+
     fn metrics(&self) -> &[Metric] {
         &METRICS
     }

@@ -11,7 +11,10 @@ use super::{ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::DataConfig;
-use crate::evaluation::{EvaluationOptions, Protocol, equations::Equations};
+use crate::evaluation::equations::Equations;
+use crate::evaluation::published::Published;
+use crate::evaluation::transitions::TransitionScoring;
+use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::experiment::ExperimentConfig;
 use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
@@ -182,8 +185,12 @@ impl ModelSettings for TransitionSettings {
         self.model.untrained(data.contact_threshold)
     }
 
-    fn protocol(&self, data: &DataConfig, options: &EvaluationOptions) -> Box<dyn Protocol> {
-        Box::new(Equations::new(data.features(), options))
+    fn protocols(&self, data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
+        let scoring = TransitionScoring::new(data.features(), options);
+        vec![
+            Box::new(Equations(scoring.clone())),
+            Box::new(Published(scoring)),
+        ]
     }
 
     fn check_gradients(

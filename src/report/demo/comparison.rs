@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::evaluation::{Scores, TableRow};
+use crate::evaluation::{ProtocolScores, TableRow};
 use crate::experiment::ExperimentConfig;
 use crate::report::{NO_TRAINING, schedule_note};
 use crate::run::Manifest;
@@ -15,10 +15,10 @@ const LONG: [usize; 2] = [100, 150];
 /// windows; its `Display` sets their LRP side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    pub interpolation: Scores,
+    pub interpolation: ProtocolScores,
     /// The best linear estimate from the keyframes, which a residual network begins with.
-    pub untrained: Scores,
-    pub model: Scores,
+    pub untrained: ProtocolScores,
+    pub model: ProtocolScores,
 }
 
 impl Comparison {
@@ -30,7 +30,7 @@ impl Comparison {
 
     /// The rows of the three in the tables, the model trained as config and manifest say.
     pub fn rows(&self, config: &ExperimentConfig, manifest: &Manifest) -> [TableRow; 3] {
-        let row = |name: &str, seed, scores: &Scores, note: &str| TableRow {
+        let row = |name: &str, seed, scores: &ProtocolScores, note: &str| TableRow {
             name: format!("{name}, generated clips"),
             seed,
             scores: Some(scores.clone()),
@@ -49,8 +49,9 @@ impl Comparison {
     /// Length, LRP (cm) of the model, of the model untrained and of interpolation.
     fn long(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         LONG.into_iter().map(|length| {
-            let lrp = |scores: &Scores| {
-                let lrp = scores.row("lrp").and_then(|row| row.at(length));
+            let lrp = |scores: &ProtocolScores| {
+                let mut protocols = scores.iter();
+                let lrp = protocols.find_map(|(_, scores)| scores.row("lrp")?.at(length));
                 lrp.unwrap_or(f64::NAN)
             };
             let scores = [&self.model, &self.untrained, &self.interpolation].map(lrp);

@@ -7,7 +7,7 @@ use std::path::Path;
 use ndarray::{Array2, s};
 
 use super::{FIGURE, TRANSITION, VIEWER};
-use crate::evaluation::equations::window_request;
+use crate::evaluation::transitions::window_request;
 use crate::models::transition::{DanceClip, Transition, TransitionRequest, window_features};
 use crate::models::{Generator, Request};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};

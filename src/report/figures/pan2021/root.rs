@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::stage::{Generated, Stage};
 use super::wording::{mean, percent, verdict};
-use crate::evaluation::equations::Equations;
+use crate::evaluation::transitions::TransitionScoring;
 use crate::models::Generator;
 use crate::models::transition::effect::{Response, body_distance, root_response};
 use crate::report::figures::{Figure, Numbers};
@@ -36,7 +36,7 @@ pub fn figure_5(stage: &Stage, model: &str, plain: &[Generated]) -> Result<Figur
     }
     let distances: Vec<f64> = plain.iter().map(root_distance).collect();
     let distance = mean(distances.iter().copied());
-    let threshold = Equations::default().root_threshold;
+    let threshold = TransitionScoring::default().root_threshold;
     let within = distances.iter().filter(|it| **it < threshold).count();
     stage.count(&mut numbers);
     numbers.add("all windows", "root_distance_mean", distance, "cm");
