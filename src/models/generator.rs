@@ -1,11 +1,13 @@
 //! What may be asked of a model, trained or not: a [`Request`] says what is given, a [`Generator`]
 //! makes a [`Motion`] of it.
 
+use std::ops::Range;
+
 use ndarray::{Array1, Array2, Array3};
 use thiserror::Error;
 
 use super::settings::ValueError;
-use crate::motion::{Pose, Skeleton};
+use crate::motion::{Clip, Pose, Skeleton};
 
 /// A pose that is given at a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,6 +163,21 @@ impl Needs {
 }
 
 impl Request {
+    /// A request for this many frames for which nothing is given.
+    pub fn new(skeleton: Skeleton, frame_time: f64, frames: usize) -> Self {
+        Self {
+            skeleton,
+            frame_time,
+            frames,
+            given: Vec::new(),
+            root: None,
+            velocity_factors: None,
+            contacts: None,
+            music: None,
+            seed: 0,
+        }
+    }
+
     /// Whether this is given.
     pub fn has(&self, condition: Condition) -> bool {
         match condition {
@@ -234,6 +251,37 @@ fn check_finite<'x>(
 }
 
 impl Motion {
+    /// World positions, `[F, joints, 3]`, cm, and nothing else.
+    pub fn new(positions: Array3<f64>) -> Self {
+        Self {
+            positions,
+            poses: None,
+            facing: None,
+            contacts: None,
+            raw: None,
+        }
+    }
+
+    /// Frames of a recording: the truth that an answer is measured against.
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`] where the clip has no such frames.
+    pub fn recorded(clip: &Clip, frames: Range<usize>) -> Result<Self, ModelError> {
+        let poses = clip.poses.get(frames.clone());
+        let poses = poses.ok_or_else(|| ModelError::Shape {
+            what: clip.name.clone(),
+            expected: vec![frames.end],
+            found: vec![clip.poses.len()],
+        })?;
+        let world = clip.skeleton.world_positions(poses);
+        let shape = (poses.len(), clip.skeleton.joints.len(), 3);
+        let positions = Array3::from_shape_fn(shape, |(t, joint, axis)| world[t][joint][axis]);
+        Ok(Self {
+            poses: Some(poses.to_vec()),
+            ..Self::new(positions)
+        })
+    }
+
     /// Refuses a motion that is no answer to a request: other numbers of frames or joints, numbers
     /// that are not finite.
     ///

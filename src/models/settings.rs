@@ -71,7 +71,9 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     ///
     /// # Errors
     /// The first value out of its range.
-    fn check(&self, data: &DataConfig) -> Result<(), ValueError>;
+    fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
+        Ok(())
+    }
 
     /// How much of its schedule is trained, in its own words, for the caption of a table.
     fn budget_note(&self) -> String {
@@ -102,14 +104,16 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// Steps to time: each `batch` windows of `frames` frames, made up.
     ///
     /// # Errors
-    /// As [`ModelSettings::task`].
+    /// As [`ModelSettings::task`]; a model that has none.
     fn made_up_task(
         &self,
-        frames: usize,
-        batch: usize,
-        streams: Streams,
-        init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32>>, ModelError>;
+        _frames: usize,
+        _batch: usize,
+        _streams: Streams,
+        _init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32>>, ModelError> {
+        Err(lacks(self.kind(), "made-up step to time"))
+    }
 
     /// The model with saved weights.
     ///
@@ -118,7 +122,9 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError>;
 
     /// The model, where it needs no training.
-    fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>>;
+    fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
+        None
+    }
 
     /// How its tables score a model. The first protocol also scores a training on validation clips.
     fn protocols(&self, data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>>;
@@ -130,10 +136,20 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// A model that is not trained, or nothing to check it on.
     fn check_gradients(
         &self,
-        options: &GradientCheckOptions,
-    ) -> Result<Vec<(String, CheckReport)>, ModelError>;
+        _options: &GradientCheckOptions,
+    ) -> Result<Vec<(String, CheckReport)>, ModelError> {
+        Err(lacks(self.kind(), "gradient check"))
+    }
 
     fn clone_box(&self) -> Box<dyn ModelSettings>;
+}
+
+/// The error of a model that is asked for what it does not have.
+fn lacks(model: &str, what: &str) -> ModelError {
+    ModelError::Model {
+        model: model.into(),
+        reason: format!("has no {what}"),
+    }
 }
 
 /// What a task is built from beside the model's own settings.

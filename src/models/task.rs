@@ -34,7 +34,9 @@ pub trait Task<T: Real>: Send + Sync {
 
     /// Numbers that are saved beside the weights and that the trained model needs, such as means
     /// and deviations of its data.
-    fn statistics(&self) -> Statistics;
+    fn statistics(&self) -> Statistics {
+        Statistics::default()
+    }
 
     /// The model with these weights, which are those that the task was built with.
     fn generator(&self, name: &str, parameters: Parameters<T>) -> Box<dyn Generator>;

@@ -17,6 +17,7 @@ use keydance::evaluation::EvaluationRecord;
 use keydance::experiment::{
     Ending, ExperimentConfig, Observer, Reproduction, Row, StepObserver, rows,
 };
+use keydance::models::settings::GradientCheckOptions;
 use keydance::models::{Request, registry};
 use keydance::run::{RunFolder, Subject};
 use keydance::training::measure::step_speed;
@@ -217,8 +218,18 @@ fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {
 }
 
 #[test]
-fn its_step_is_timed() {
+fn what_it_does_not_have_is_said() {
     let folder = configs();
-    let speed = step_speed(&load(folder.path(), &[]), 20, 3, 1, 1).unwrap();
-    assert!(speed.frame_steps_per_second > 0.0);
+    let config = load(folder.path(), &[]);
+    let error = step_speed(&config, 20, 3, 1, 1).unwrap_err().to_string();
+    assert!(error.contains("toy: has no made-up step"), "{error}");
+    let options = GradientCheckOptions {
+        frames: None,
+        full_size: false,
+        windows: 1,
+        per_parameter: 1,
+        seed: 1,
+    };
+    let error = config.model.check_gradients(&options).unwrap_err();
+    assert!(error.to_string().contains("toy: has no gradient check"));
 }

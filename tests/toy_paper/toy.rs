@@ -4,14 +4,13 @@
 
 use std::f64::consts::{LN_2, PI, TAU};
 
-use keydance::autograd::check::CheckReport;
 use keydance::autograd::{AutogradError, BlockId, BufferId, Parameters, Tape};
 use keydance::data::{DataConfig, DataPart, Dataset, Recording};
 use keydance::evaluation::{
     Better, Evaluation, EvaluationError, EvaluationOptions, Metric, Protocol, ScoreRow, Scores,
 };
 use keydance::models::generator::{Condition, Given, NeededPoses, Needs};
-use keydance::models::settings::{GradientCheckOptions, InitialRng, LoadError, ValueError};
+use keydance::models::settings::{InitialRng, LoadError, ValueError};
 use keydance::models::weights::SavedWeights;
 use keydance::models::{
     Generator, LossTerms, ModelError, ModelKind, ModelSettings, Motion, Paper, Request, Statistics,
@@ -108,21 +107,6 @@ impl ModelSettings for Toy {
         }))
     }
 
-    fn made_up_task(
-        &self,
-        _frames: usize,
-        _batch: usize,
-        streams: Streams,
-        init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32>>, ModelError> {
-        Ok(Box::new(ToyTask {
-            sizes: self.model.clone(),
-            heights: vec![vec![90.0; 2 * WINDOW]],
-            weights: Weights::new(init),
-            streams,
-        }))
-    }
-
     fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
         let mut parameters = Parameters::new();
         let rng = Streams::new(0).initialisation();
@@ -131,19 +115,8 @@ impl ModelSettings for Toy {
         Ok(Box::new(TrainedToy::new(name, &weights, &parameters)))
     }
 
-    fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
-        None
-    }
-
     fn protocols(&self, _: &DataConfig, _: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
         vec![Box::new(ToyProtocol)]
-    }
-
-    fn check_gradients(
-        &self,
-        _options: &GradientCheckOptions,
-    ) -> Result<Vec<(String, CheckReport)>, ModelError> {
-        Ok(Vec::new())
     }
 
     fn clone_box(&self) -> Box<dyn ModelSettings> {
@@ -207,10 +180,6 @@ impl Task<f32> for ToyTask {
             task: self,
             windows: windows.collect(),
         })
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics::default()
     }
 
     fn generator(&self, name: &str, parameters: Parameters<f32>) -> Box<dyn Generator> {
@@ -323,24 +292,19 @@ impl Generator for TrainedToy {
             let pose = &request.given[0].pose;
             let body = pose.world_positions(&request.skeleton);
             let mut height = pose.translations[0].y;
-            let mut raw = Array2::zeros((request.frames, 1));
-            let mut positions = Array3::zeros((request.frames, body.len(), 3));
-            for frame in 0..request.frames {
+            let raw = Array2::from_shape_fn((request.frames, 1), |(frame, _)| {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 height = self.expected(height, music[[frame, 0]]) + self.s.exp() * noise;
-                raw[[frame, 0]] = height;
-                for (joint, place) in body.iter().enumerate() {
-                    let up = place.y + height - pose.translations[0].y;
-                    let place = ndarray::arr1(&[place.x, up, place.z]);
-                    positions.slice_mut(s![frame, joint, ..]).assign(&place);
-                }
-            }
+                height
+            });
+            let shape = (request.frames, body.len(), 3);
+            let positions = Array3::from_shape_fn(shape, |(frame, joint, axis)| match axis {
+                1 => body[joint].y + raw[[frame, 0]] - pose.translations[0].y,
+                _ => body[joint][axis],
+            });
             Ok(Motion {
-                positions,
-                poses: None,
-                facing: None,
-                contacts: None,
                 raw: Some(raw),
+                ..Motion::new(positions)
             })
         };
         requests.iter().map(answer).collect()
@@ -369,36 +333,19 @@ impl Generator for TrainedToy {
 /// What is asked about frames `start`.. of a recording, and what was recorded.
 pub fn question(recording: &Recording, start: usize, frames: usize) -> (Request, Motion) {
     let clip = &recording.clip;
+    let before = Given {
+        frame: -1,
+        pose: clip.poses[start - 1].clone(),
+        features: None,
+    };
+    let clicks = Array2::from_shape_fn((frames, 1), |(t, _)| click(start + t));
     let request = Request {
-        skeleton: clip.skeleton.clone(),
-        frame_time: clip.frame_time,
-        frames,
-        given: vec![Given {
-            frame: -1,
-            pose: clip.poses[start - 1].clone(),
-            features: None,
-        }],
-        root: None,
-        velocity_factors: None,
-        contacts: None,
-        music: Some(Array2::from_shape_fn((frames, 1), |(t, _)| {
-            click(start + t)
-        })),
+        given: vec![before],
+        music: Some(clicks),
         seed: start as u64,
+        ..Request::new(clip.skeleton.clone(), clip.frame_time, frames)
     };
-    let world: Vec<_> = clip.poses[start..start + frames]
-        .iter()
-        .map(|pose| pose.world_positions(&clip.skeleton))
-        .collect();
-    let shape = (frames, clip.skeleton.joints.len(), 3);
-    let positions = Array3::from_shape_fn(shape, |(t, joint, axis)| world[t][joint][axis]);
-    let truth = Motion {
-        positions,
-        poses: None,
-        facing: None,
-        contacts: None,
-        raw: None,
-    };
+    let truth = Motion::recorded(clip, start..start + frames).unwrap();
     (request, truth)
 }
 

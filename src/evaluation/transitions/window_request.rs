@@ -21,14 +21,9 @@ pub fn window_request(clip: &Clip, start: usize, window: ArrayView2<f64>) -> Opt
         })
     };
     Some(Request {
-        skeleton: clip.skeleton.clone(),
-        frame_time: clip.frame_time,
-        frames: window.nrows(),
         given: vec![given(0)?, given(length)?],
         root: Some(window.slice(s![.., ROOT_POSITION]).to_owned()),
         velocity_factors: Some(window.slice(s![.., VELOCITY_FACTORS]).to_owned()),
-        contacts: None,
-        music: None,
-        seed: 0,
+        ..Request::new(clip.skeleton.clone(), clip.frame_time, window.nrows())
     })
 }

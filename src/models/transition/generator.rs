@@ -70,11 +70,10 @@ fn motion(request: &Request, transition: Transition) -> Result<Motion, ModelErro
         }
     }
     Ok(Motion {
-        positions,
-        poses: None,
         facing: Some(rows.column(FACING.start).to_owned()),
         contacts: Some(rows.slice(s![.., CONTACTS]).to_owned()),
         raw: Some(frames),
+        ..Motion::new(positions)
     })
 }
 
