@@ -20,35 +20,46 @@ pub fn in_contact(frame: ArrayView1<f64>) -> [bool; 4] {
     std::array::from_fn(|foot| frame[CONTACTS.start + foot] > CONTACT_LABEL)
 }
 
-/// Contact labels of every frame, `[frames][4]`: 1 where the squared world-space speed is below
+/// Contact labels of every frame, `[frames][feet]`: 1 where the squared world-space speed is below
 /// `threshold` ((cm/frame)^2).
+///
+/// `world`: world positions of a skeleton's joints, `[frames][joints]`, cm; `feet`: which of them
+/// are foot joints, such as [`FOOT_JOINTS`].
 ///
 /// The speed of frame t is that from t - 1 to t; the first frame has the labels of the second, and
 /// a clip of one frame counts as standing. World space, because relative to the root a planted foot
 /// of a moving dancer looks like a moving one.
-pub fn contacts(world: &[Vec<DVec3>], threshold: f64) -> Vec<[f64; 4]> {
-    let mut labels: Vec<[f64; 4]> = world
+pub fn contacts<const FEET: usize>(
+    world: &[Vec<DVec3>],
+    feet: [usize; FEET],
+    threshold: f64,
+) -> Vec<[f64; FEET]> {
+    let mut labels: Vec<[f64; FEET]> = world
         .windows(2)
         .map(|pair| {
-            FOOT_JOINTS.map(|joint| {
+            feet.map(|joint| {
                 let squared_speed = (pair[1][joint] - pair[0][joint]).length_squared();
                 if squared_speed < threshold { 1.0 } else { 0.0 }
             })
         })
         .collect();
-    labels.insert(0, labels.first().copied().unwrap_or([1.0; 4]));
+    labels.insert(0, labels.first().copied().unwrap_or([1.0; FEET]));
     labels
 }
 
 /// Foot skate: the mean distance (cm/frame) that a foot joint moves in the world from the frame
 /// before to one in which it is in contact. None where no joint is.
 ///
-/// `world`: world positions of the dance skeleton's joints, `[frames][24]`, cm; `contacts`:
-/// `[frames]` in the order of [`FOOT_JOINTS`].
-pub fn foot_skate(world: &[Vec<DVec3>], contacts: &[[bool; 4]]) -> Option<f64> {
+/// `world`: world positions of a skeleton's joints, `[frames][joints]`, cm; `feet`: which of them
+/// are foot joints; `contacts`: `[frames]` in their order.
+pub fn foot_skate<const FEET: usize>(
+    world: &[Vec<DVec3>],
+    feet: [usize; FEET],
+    contacts: &[[bool; FEET]],
+) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for (pair, contacts) in world.windows(2).zip(contacts.iter().skip(1)) {
-        for (joint, _) in FOOT_JOINTS.iter().zip(contacts).filter(|(_, on)| **on) {
+        for (joint, _) in feet.iter().zip(contacts).filter(|(_, on)| **on) {
             sum += pair[1][*joint].distance(pair[0][*joint]);
             count += 1;
         }

@@ -4,28 +4,49 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-const LEFT_HIP: usize = 1;
-const RIGHT_HIP: usize = 5;
-const RIGHT_ARM: usize = 15;
-const LEFT_ARM: usize = 19;
+/// The joints that lie across the body; forward is at a right angle to both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FacingJoints {
+    /// Left and right.
+    pub hips: [usize; 2],
+    /// Left and right.
+    pub arms: [usize; 2],
+}
+
+impl FacingJoints {
+    /// Those of the dance skeleton.
+    pub const DANCE: Self = Self {
+        hips: [1, 5],
+        arms: [19, 15],
+    };
+
+    /// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts
+    /// less in the smoothing.
+    fn forward(&self, positions: &[DVec3]) -> DVec2 {
+        let across = |[left, right]: [usize; 2]| positions[left] - positions[right];
+        let forward = (across(self.hips) + across(self.arms)).cross(DVec3::Y);
+        DVec2::new(forward.x, forward.z)
+    }
+}
 
 /// Facing angle about Y of every frame, `[frames]`, rad: 0 looks along +Z, pi/2 along +X.
 ///
-/// `world` holds the world positions of the dance skeleton's joints, `[frames][24]`, cm. The
-/// forward direction is smoothed with a Gaussian of standard deviation `sigma` frames before its
-/// angle is taken. The first angle lies in (-pi, pi]; from there the angle is followed without
-/// jumps of 2 pi.
-pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
+/// `world` holds the world positions of a skeleton's joints, `[frames][joints]`, cm. The forward
+/// direction is smoothed with a Gaussian of standard deviation `sigma` frames before its angle is
+/// taken. The first angle lies in (-pi, pi]; from there the angle is followed without jumps of 2
+/// pi.
+pub fn facing_angles(world: &[Vec<DVec3>], joints: &FacingJoints, sigma: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (world.first(), world.last()) else {
         return Vec::new();
     };
-    smooth_angles(world, [forward(first), forward(last)], sigma)
+    let ends = [joints.forward(first), joints.forward(last)];
+    smooth_angles(world, joints, ends, sigma)
 }
 
 /// Facing angles of predicted frames between two keyframes whose own facing angles are known,
 /// `[N + 1]`, rad.
 ///
-/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][24]`,
+/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][joints]`,
 /// cm; `start` and `target` are the facing angles of k1 and k2. [`facing_angles`] smooths over the
 /// frames before k1 and after k2 too; here those are not there, and the dancer is taken to face
 /// along `start` before k1 and along `target` after k2. What the smoothed angles of k1 and k2 then
@@ -35,6 +56,7 @@ pub fn facing_angles(world: &[Vec<DVec3>], sigma: f64) -> Vec<f64> {
 /// own bodies.
 pub fn facing_angles_between(
     world: &[Vec<DVec3>],
+    joints: &FacingJoints,
     [start, target]: [f64; 2],
     sigma: f64,
 ) -> Vec<f64> {
@@ -42,8 +64,11 @@ pub fn facing_angles_between(
         return Vec::new();
     };
     let along = |angle: f64, like: DVec2| DVec2::new(angle.sin(), angle.cos()) * like.length();
-    let ends = [along(start, forward(first)), along(target, forward(last))];
-    let angles = smooth_angles(world, ends, sigma);
+    let ends = [
+        along(start, joints.forward(first)),
+        along(target, joints.forward(last)),
+    ];
+    let angles = smooth_angles(world, joints, ends, sigma);
     let last = angles.len() - 1;
     // Between -pi and pi, so that the first frame keeps the turns that `start` counts.
     let missing = |known: f64, found: f64| (known - found) - ((known - found) / TAU).round() * TAU;
@@ -62,23 +87,20 @@ pub fn facing_angles_between(
 
 /// Angles of the smoothed forward directions, unwrapped; `ends` are the directions before the first
 /// frame and after the last.
-fn smooth_angles(world: &[Vec<DVec3>], ends: [DVec2; 2], sigma: f64) -> Vec<f64> {
-    let forward: Vec<DVec2> = world.iter().map(|positions| forward(positions)).collect();
+fn smooth_angles(
+    world: &[Vec<DVec3>],
+    joints: &FacingJoints,
+    ends: [DVec2; 2],
+    sigma: f64,
+) -> Vec<f64> {
+    let forward = world.iter().map(|positions| joints.forward(positions));
+    let forward: Vec<DVec2> = forward.collect();
     let mut angles: Vec<f64> = gaussian(&forward, ends, sigma)
         .into_iter()
         .map(|direction| direction.x.atan2(direction.y))
         .collect();
     unwrap(&mut angles);
     angles
-}
-
-/// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts less
-/// in the smoothing.
-fn forward(positions: &[DVec3]) -> DVec2 {
-    let across =
-        (positions[LEFT_HIP] - positions[RIGHT_HIP]) + (positions[LEFT_ARM] - positions[RIGHT_ARM]);
-    let forward = across.cross(DVec3::Y);
-    DVec2::new(forward.x, forward.z)
 }
 
 /// Gaussian smoothing over time, `sigma` in frames: the kernel reaches 4 sigma to either side;

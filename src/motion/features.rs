@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::clip::Clip;
-use super::contact::contacts;
-use super::facing::facing_angles;
+use super::contact::{FOOT_JOINTS, contacts};
+use super::facing::{FacingJoints, facing_angles};
 use super::velocity_factor::velocity_factors;
 
 /// p^b: positions of the 23 joints relative to the root, turned to face +Z, cm.
@@ -90,8 +90,8 @@ pub enum FeatureError {
 pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, FeatureError> {
     check(clip, config)?;
     let world = clip.skeleton.world_positions(&clip.poses);
-    let facing = facing_angles(&world, config.facing_sigma);
-    let contacts = contacts(&world, config.contact_threshold);
+    let facing = facing_angles(&world, &FacingJoints::DANCE, config.facing_sigma);
+    let contacts = contacts(&world, FOOT_JOINTS, config.contact_threshold);
     let mut features = Array2::zeros((world.len(), FEATURES));
     for (time, positions) in world.iter().enumerate() {
         let mut frame = features.row_mut(time);

@@ -13,7 +13,7 @@ use crate::models::generator::NeededPoses;
 use crate::models::transition::KeyframePose;
 use crate::models::{Generator, Motion};
 use crate::motion::contact::{CONTACT_LABEL, FOOT_JOINTS, foot_skate};
-use crate::motion::facing::facing_angles;
+use crate::motion::facing::{FacingJoints, facing_angles};
 use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
@@ -224,7 +224,10 @@ impl<'r> Made<'r> {
         };
         let facing = match motion.facing {
             Some(facing) => facing.to_vec(),
-            None => facing_angles(&positions, FeatureConfig::default().facing_sigma),
+            None => {
+                let sigma = FeatureConfig::default().facing_sigma;
+                facing_angles(&positions, &FacingJoints::DANCE, sigma)
+            }
         };
         if let Some(contacts) = motion.contacts {
             let rows = contacts.slice(s![1.., ..]);
@@ -301,7 +304,8 @@ impl<'r> Made<'r> {
             .collect();
         let fits = &self.fits;
         let skeleton = &self.request.skeleton;
-        let skate = |poses: &[Pose]| foot_skate(&skeleton.world_positions(poses), &contacts);
+        let skate =
+            |poses: &[Pose]| foot_skate(&skeleton.world_positions(poses), FOOT_JOINTS, &contacts);
         let keyframes = self.request.times();
         let before = skate(&self.poses);
         if options.foot_cleanup {

@@ -1,7 +1,7 @@
 //! Contact labels and foot skate.
 
 use glam::DVec3;
-use keydance::motion::contact::{contacts, foot_skate};
+use keydance::motion::contact::{FOOT_JOINTS, contacts, foot_skate};
 
 #[test]
 fn skate_counts_only_feet_in_contact() {
@@ -11,8 +11,8 @@ fn skate_counts_only_feet_in_contact() {
     frames[2][7].y = 50.0;
     let on = |left, right| [left, false, right, false];
     let contacts = [on(true, true), on(true, false), on(true, false)];
-    assert_eq!(foot_skate(&frames, &contacts), Some(1.5));
-    assert_eq!(foot_skate(&frames, &[[false; 4]; 3]), None);
+    assert_eq!(foot_skate(&frames, FOOT_JOINTS, &contacts), Some(1.5));
+    assert_eq!(foot_skate(&frames, FOOT_JOINTS, &[[false; 4]; 3]), None);
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn a_planted_foot_of_a_moving_dancer_is_in_contact() {
         frame[7] = DVec3::new(0.0, 0.0, 2.0 * time as f64);
     }
     frames[2][4] = DVec3::new(0.0, 0.5, 0.0);
-    let labels = contacts(&frames, 0.2);
+    let labels = contacts(&frames, FOOT_JOINTS, 0.2);
     assert_eq!(
         labels,
         vec![
@@ -32,4 +32,12 @@ fn a_planted_foot_of_a_moving_dancer_is_in_contact() {
             [1.0, 0.0, 0.0, 1.0]
         ]
     );
+}
+
+#[test]
+fn feet_of_another_skeleton_are_those_that_are_named() {
+    let mut frames = vec![vec![DVec3::ZERO; 3]; 2];
+    frames[1][2].x = 1.0;
+    assert_eq!(contacts(&frames, [1, 2], 0.2), vec![[1.0, 0.0]; 2]);
+    assert_eq!(foot_skate(&frames, [2], &[[true]; 2]), Some(1.0));
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use assert_cmd::cargo::cargo_bin_cmd;
 use glam::{DQuat, DVec3, EulerRot};
 use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
-use keydance::motion::facing::{facing_angles, facing_angles_between};
+use keydance::motion::facing::{FacingJoints, facing_angles, facing_angles_between};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FEATURES, ROOT_POSITION, ROOT_VELOCITY,
     VELOCITY_FACTORS,
@@ -305,7 +305,7 @@ proptest! {
         angles in prop::collection::vec(-9.0..9.0f64, 1..40),
         known in prop::array::uniform2(-9.0..9.0f64),
     ) {
-        let between = facing_angles_between(&turning(&angles), known, 20.0);
+        let between = facing_angles_between(&turning(&angles), &FacingJoints::DANCE, known, 20.0);
         prop_assert_eq!(between.len(), angles.len());
         prop_assert!((between[0] - known[0]).abs() < 1e-9 || angles.len() == 1);
         let turns = (between[angles.len() - 1] - known[1]) / TAU;
@@ -322,15 +322,15 @@ fn facing_between_keyframes_of_a_recorded_clip_is_that_of_the_whole_clip() {
     };
     let angles: Vec<f64> = (0..400).map(angle).collect();
     let world = turning(&angles);
-    let whole = facing_angles(&world, 20.0);
+    let whole = facing_angles(&world, &FacingJoints::DANCE, 20.0);
     let (mut between, mut alone, mut count) = (0.0, 0.0, 0);
     for length in [5, 30, 100] {
         for start in (0..400 - length).step_by(20) {
             let window = &world[start..=start + length];
             let known = [whole[start], whole[start + length]];
             let pairs = [
-                facing_angles_between(window, known, 20.0),
-                facing_angles(window, 20.0),
+                facing_angles_between(window, &FacingJoints::DANCE, known, 20.0),
+                facing_angles(window, &FacingJoints::DANCE, 20.0),
             ]
             .map(|found| {
                 let errors = found.iter().zip(&whole[start..]).map(|(a, b)| {

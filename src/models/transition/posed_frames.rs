@@ -4,7 +4,7 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView1, s};
 
 use super::motion_rows::rows_from;
-use crate::motion::facing::facing_angles_between;
+use crate::motion::facing::{FacingJoints, facing_angles_between};
 use crate::motion::features::{CONTACTS, FACING, write_positions, write_velocities};
 use crate::motion::placement::world_positions;
 
@@ -29,7 +29,7 @@ pub(crate) fn posed_frames(
     let mut with_start = vec![world_positions(start).to_vec()];
     with_start.extend_from_slice(world);
     let ends = [start[FACING.start], target[FACING.start]];
-    let facing = facing_angles_between(&with_start, ends, sigma);
+    let facing = facing_angles_between(&with_start, &FacingJoints::DANCE, ends, sigma);
     let mut rows = rows_from(start, world.len());
     for row in 1..rows.nrows() {
         write_positions(&mut rows.row_mut(row), &with_start[row], facing[row]);
