@@ -23,7 +23,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod autograd;
-#[cfg(feature = "papers")]
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod data;
 pub mod evaluation;
@@ -37,3 +37,6 @@ pub mod run;
 #[cfg(feature = "papers")]
 pub mod synthesis;
 pub mod training;
+
+// What the signatures are made of, in the versions that they are made of.
+pub use {ndarray, rand};
