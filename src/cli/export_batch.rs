@@ -3,12 +3,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::warn;
 use crate::data::Dataset;
-use crate::models::transition::exported_batch::{ExportError, ExportedBatch, export_batch};
+use crate::models::transition::exported_batch::{ExportedBatch, export_batch};
 use crate::models::transition::{DanceClip, Forcing, TransitionSettings};
 use crate::run::{RunFolder, replace_file};
 
@@ -52,13 +52,6 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
             false => Forcing::FreeRunning,
         },
     };
-    match export_batch(&model, settings.model.root_frame(), &clips, &batch) {
-        Ok(file) => Ok(replace_file(&args.out, &file)?),
-        Err(ExportError::TooShort { frames }) => bail!(
-            "no training clip of {} has the {} frames that --frames {frames} needs",
-            args.data.display(),
-            frames + 1
-        ),
-        Err(other) => Err(other.into()),
-    }
+    let file = export_batch(&model, settings.model.root_frame(), &clips, &batch)?;
+    Ok(replace_file(&args.out, file)?)
 }

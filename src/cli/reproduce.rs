@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::notice::{notice, warn};
 use super::progress::Progress;
-use super::stop::{Stop, interrupted, quote};
+use super::stop::{Stop, command_line, interrupted};
 use super::threads::Threads;
 use super::train;
 use super::watched::evaluate_watched;
@@ -137,12 +137,8 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Ending::Stopped => {
-            // The command as it was given.
-            let words = std::env::args().skip(1).map(|word| quote(&word));
-            let command = words.collect::<Vec<_>>().join(" ");
-            notice(format_args!(
-                "stopped and saved; go on with\n  keydance {command}"
-            ));
+            let command = command_line();
+            notice(format_args!("stopped and saved; go on with\n  {command}"));
             Ok(interrupted())
         }
         Ending::Diverged(error) => Err(anyhow::Error::new(error).context("a training diverged")),
