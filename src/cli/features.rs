@@ -3,14 +3,15 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
+use ndarray_npy::WriteNpyExt as _;
 
 use super::file_units::FileUnits;
 use super::notice::warn;
 use crate::data::DataConfig;
 use crate::models::transition::DanceClip;
 use crate::motion::{Mapping, bvh};
+use crate::run::replace_file;
 
 #[derive(Debug, Args)]
 pub struct FeaturesArgs {
@@ -36,8 +37,9 @@ pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
     let (measured, notices) = DanceClip::from_file(clip, mapping.as_ref(), &data)?;
     warn(&notices);
     let array = measured.features.mapv(|value| value as f32);
-    ndarray_npy::write_npy(&args.npy, &array)
-        .with_context(|| format!("{} cannot be written", args.npy.display()))?;
+    let mut file = Vec::new();
+    array.write_npy(&mut file)?;
+    replace_file(&args.npy, file)?;
     let (frames, numbers) = array.dim();
     writeln!(
         std::io::stdout(),

@@ -238,7 +238,7 @@ fn read_clip(
     let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
     Ok(ReadClip {
         recording,
-        digest: hexadecimal(&Sha256::digest(&bytes)),
+        digest: file_digest(&bytes),
         notices,
     })
 }
@@ -267,6 +267,11 @@ fn digest<'a>(clips: impl Iterator<Item = &'a ReadClip>) -> String {
         .map(|(name, digest)| format!("{digest}  {name}\n"))
         .collect();
     hexadecimal(&Sha256::digest(list.as_bytes()))
+}
+
+/// SHA-256 of a file's content, hexadecimal.
+pub(crate) fn file_digest(content: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(content))
 }
 
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {

@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use sha2::{Digest as _, Sha256};
 
 use super::results::RowResults;
 use super::rows::Row;
 use super::{ReproduceError, Reproduction};
-use crate::data::hexadecimal;
+use crate::data::file_digest;
 use crate::evaluation::{EvaluationRecord, TableRow, Tables};
 use crate::report::{NO_TRAINING, schedule_note, score_figure};
 use crate::run::{FileError, Manifest, RunState, replace_file, write_json};
@@ -158,7 +157,7 @@ fn digests(out: &Path, files: &[PathBuf]) -> Result<BTreeMap<String, String>, Fi
         let content = std::fs::read(path).map_err(FileError::at(path, "read"))?;
         let name = path.strip_prefix(out).unwrap_or(path);
         let name: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
-        Ok((name.join("/"), hexadecimal(&Sha256::digest(&content))))
+        Ok((name.join("/"), file_digest(&content)))
     };
     files.iter().map(digest).collect()
 }

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::trainer::Trainer;
+use crate::data::file_digest;
 use crate::experiment::ExperimentConfig;
 use crate::run::checkpoint::{self, Checkpoint};
 use crate::run::{RunError, RunFolder};
@@ -66,7 +67,7 @@ impl Trainer<'_> {
             moments,
             weights,
         } = checkpoint;
-        let digest = checkpoint::file_digest(self.config_toml.as_bytes());
+        let digest = file_digest(self.config_toml.as_bytes());
         // Another version may write the same config with more keys.
         if header.config_digest != digest
             && ExperimentConfig::parse(&weights.config, "the checkpoint's config")? != self.config
