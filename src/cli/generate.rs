@@ -67,6 +67,7 @@ pub struct GenerateArgs {
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
+    subject.check_features()?;
     let data = args.units.over(&subject.config.data);
     let keyframes = Keyframes::read(&args.keyframes.choice(), &data)?;
     warn(keyframes.notices());

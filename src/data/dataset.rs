@@ -184,11 +184,10 @@ impl Dataset {
         read: impl Fn(&String, Option<&Mapping>) -> Result<ReadClip, DataError> + Sync,
     ) -> Result<Self, DataError> {
         let parts = split(names, origin, config)?;
-        let mapping = config.mapping.as_deref().map(Mapping::read).transpose()?;
         let read = |names: &Vec<String>| -> Result<Vec<ReadClip>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
-                .map(|name| read(name, mapping.as_ref()))
+                .map(|name| read(name, config.mapping.as_ref()))
                 .collect();
             clips.into_iter().collect()
         };

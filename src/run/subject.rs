@@ -69,13 +69,8 @@ impl Subject {
         let Some(run) = &self.run else {
             return Ok(());
         };
-        let trained = run.config()?.data;
-        if trained != self.config.data {
-            let config = |data| ExperimentConfig {
-                data,
-                ..ExperimentConfig::default()
-            };
-            let differences = config(trained).differences(&config(self.config.data.clone()))?;
+        let differences = self.data_differences(run)?;
+        if !differences.is_empty() {
             return Err(RunError::Refused(format!(
                 "{} was trained on other clips or features of the data ({}; values there, values \
                  now), so some of these may be its training clips; give --other-data to use it on \
@@ -97,6 +92,37 @@ impl Subject {
             )));
         }
         Ok(())
+    }
+
+    /// What differs from the `[data]` that the run was trained with.
+    fn data_differences(&self, run: &RunFolder) -> Result<Vec<String>, RunError> {
+        let trained = ExperimentConfig {
+            data: run.config()?.data,
+            ..self.config.clone()
+        };
+        Ok(trained.differences(&self.config)?)
+    }
+
+    /// Refuses a rate, or another key of the features, that the run was not trained with: its model
+    /// would misread every pose.
+    ///
+    /// # Errors
+    /// The key, with both values.
+    pub fn check_features(&self) -> Result<(), RunError> {
+        let Some(run) = &self.run else {
+            return Ok(());
+        };
+        let keys = ["data.fps:", "data.contact_threshold:", "data.facing_sigma:"];
+        let mut differences = self.data_differences(run)?;
+        differences.retain(|difference| keys.iter().any(|key| difference.starts_with(key)));
+        match &differences[..] {
+            [] => Ok(()),
+            _ => Err(RunError::Refused(format!(
+                "{} was trained on other features ({}; values there, values now); leave these out",
+                run.path().display(),
+                differences.join("; ")
+            ))),
+        }
     }
 
     /// The folder that keeps the scores: the run's, or for a config `out`, made with the config in

@@ -176,12 +176,15 @@ impl Keyframes {
                     .map(|keyframe| format!("{}:{}", keyframe.file.display(), keyframe.frame)),
             });
         }
-        let path = choice.mapping.as_deref().or(data.mapping.as_deref());
+        let mapping = match &choice.mapping {
+            Some(path) => Some(Mapping::read(path)?),
+            None => data.mapping.clone(),
+        };
         let mut read = Self {
             sources: BTreeMap::new(),
             keyframes,
             motion,
-            mapping: path.map(Mapping::read).transpose()?,
+            mapping,
             data: DataConfig {
                 skip_frames: 0,
                 ..data.clone()

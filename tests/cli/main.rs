@@ -23,6 +23,7 @@ mod bad_input;
 mod commands;
 mod demo;
 mod documents;
+mod elsewhere;
 mod evaluate;
 mod figures;
 mod generate;
