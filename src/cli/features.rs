@@ -11,7 +11,7 @@ use super::notice::warn;
 use crate::data::DataConfig;
 use crate::models::transition::DanceClip;
 use crate::motion::{Mapping, bvh};
-use crate::run::replace_file;
+use crate::run::{check_outputs, replace_file};
 
 #[derive(Debug, Args)]
 pub struct FeaturesArgs {
@@ -25,12 +25,17 @@ pub struct FeaturesArgs {
     mapping: Option<PathBuf>,
     #[command(flatten)]
     units: FileUnits,
+    /// Replace the array where it is there already
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
 /// A file cannot be read, or the clip does not go onto the dance skeleton; nothing is written then.
 /// The array cannot be written.
 pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
+    let inputs = [&args.file].into_iter().chain(&args.mapping);
+    check_outputs([&args.npy], inputs, args.force)?;
     let mapping = args.mapping.as_deref().map(Mapping::read).transpose()?;
     let clip = bvh::read(&args.file)?.to_clip();
     let data = args.units.over(&DataConfig::default());

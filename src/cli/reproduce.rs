@@ -66,6 +66,9 @@ pub struct ReproduceArgs {
     /// depends on it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
+    /// Write into a folder that holds other files or tables of other rows, and replace the tables
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -126,6 +129,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         no_training: args.no_training,
         observer: &terminal,
     };
+    reproduction.check_out(args.force)?;
     let ending = reproduction.run().map_err(|error| match error {
         // By itself: whether the output is closed is seen from its kind.
         ReproduceError::Output(error) => error.into(),

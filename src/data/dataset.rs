@@ -151,6 +151,16 @@ impl Dataset {
         Ok(dataset)
     }
 
+    /// The [digest](Dataset::digest) of all clips in a folder; none where they cannot be read.
+    pub fn digest_of(folder: &Path) -> Option<String> {
+        let read = |(name, path)| Some((name, file_digest(&std::fs::read(path).ok()?)));
+        let clips = clip_files(folder).ok()?.into_iter().map(read);
+        let clips: Vec<(String, String)> = clips.collect::<Option<_>>()?;
+        Some(digest(
+            clips.iter().map(|(name, digest)| (&**name, &**digest)),
+        ))
+    }
+
     /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as
     /// files.
     ///
@@ -198,7 +208,7 @@ impl Dataset {
         } = &parts;
         let (train, validation, test) = (read(train)?, read(validation)?, read(test)?);
         let all = || train.iter().chain(&validation).chain(&test);
-        let digest = digest(all());
+        let digest = digest(all().map(|clip| (clip.recording.name(), &*clip.digest)));
         let warnings = grouped(all().map(|clip| (clip.recording.name(), &clip.notices[..])));
         let clips = |part: Vec<ReadClip>| part.into_iter().map(|clip| clip.recording).collect();
         let dataset = Self {
@@ -256,10 +266,9 @@ fn pose_digest(clip: &Clip) -> String {
     hexadecimal(&hash.finalize())
 }
 
-fn digest<'a>(clips: impl Iterator<Item = &'a ReadClip>) -> String {
-    let mut lines: Vec<(&str, &str)> = clips
-        .map(|clip| (clip.recording.name(), clip.digest.as_str()))
-        .collect();
+/// SHA-256 over clips by their names and digests, hexadecimal.
+fn digest<'a>(clips: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    let mut lines: Vec<(&str, &str)> = clips.collect();
     lines.sort_unstable();
     let list: String = lines
         .into_iter()

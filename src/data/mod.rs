@@ -12,5 +12,6 @@ mod twins;
 pub use config::{DataConfig, Split};
 pub use dataset::{DataError, Dataset, Recording};
 pub(crate) use dataset::{file_digest, hexadecimal};
+pub(crate) use folder::{clip_files, is_clip};
 pub use part::{DataPart, EmptyPart};
 pub use reading::FileReading;

@@ -28,6 +28,7 @@ mod evaluate;
 mod figures;
 mod generate;
 mod odd_files;
+mod outputs;
 mod report;
 mod reproduce;
 mod stopped;
