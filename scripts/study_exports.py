@@ -63,7 +63,7 @@ def main():
                 arguments.exit(1, done.stderr)  # warnings of other calls would bury the table
 
         def features(file):
-            keydance("features", file, "--npy", table)
+            keydance("features", file, "--npy", table, "--force")
             return np.load(table).astype(np.float64)
 
         sums = dict.fromkeys(("true", "false", "clips"), 0)
@@ -77,7 +77,7 @@ def main():
             for refined in ("true", "false"):
                 option = f"model.velocity_refinement={refined}"
                 words = ("--motion", file, "--keyframes", frames, "--set", option, "--out", motion)
-                keydance("generate", given.run, *words)
+                keydance("generate", given.run, *words, "--force")
                 sums[refined] += measured(features(motion), clip)
 
     print(f"{len(names)} clips, keyframes every {given.spacing} frames")

@@ -72,7 +72,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name in train_names + test_names:
             file = pathlib.Path(folder, "features.npy")
-            command = [given.keydance, "features", given.data / name, "--npy", file]
+            command = [given.keydance, "features", given.data / name, "--npy", file, "--force"]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             clips[name] = np.load(file)
     held_names = train_names[::11]

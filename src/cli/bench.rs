@@ -2,7 +2,6 @@
 
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Args;
 use serde::Serialize;
@@ -10,7 +9,7 @@ use serde::Serialize;
 use crate::experiment::ExperimentConfig;
 use crate::models::transition::ModelConfig;
 use crate::models::transition::measure::MeasuredGeneration;
-use crate::nn::measure::{Measured, MeasuredLayers};
+use crate::nn::measure::{Measured, MeasuredLayers, fastest};
 use crate::training::measure::step_speed;
 
 /// Frames of the generated transitions.
@@ -92,11 +91,7 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
         args.threads.into(),
         args.repetitions.into(),
     )?;
-    let text = format!(
-        "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
-        speed.batch, speed.frames, speed.threads, speed.seconds, speed.frame_steps_per_second
-    );
-    print(args.json, &speed, &text)
+    print(args.json, &speed, &speed.to_string())
 }
 
 /// Times forward and backward of the model's layers by themselves.
@@ -107,7 +102,7 @@ pub fn layers(args: LayersArgs) -> anyhow::Result<()> {
     let threads = args.threads;
     let milliseconds = |measured| -> anyhow::Result<f64> {
         let mut layers = MeasuredLayers::new(measured, threads.into())?;
-        Ok(1e3 * fastest(args.repetitions, || Ok(layers.run()?))?)
+        Ok(1e3 * fastest(args.repetitions.into(), || layers.run())?)
     };
     let lstm = milliseconds(Measured::Lstm)?;
     let encoder = milliseconds(Measured::EncoderLayers)?;
@@ -131,7 +126,7 @@ pub fn layers(args: LayersArgs) -> anyhow::Result<()> {
 pub fn generate(args: GenerateArgs) -> anyhow::Result<()> {
     let (batch, threads) = (usize::from(args.batch), usize::from(args.threads));
     let mut generation = MeasuredGeneration::new(&ModelConfig::default(), FRAMES, batch, threads)?;
-    let seconds = fastest(args.repetitions, || Ok(generation.run()?))?;
+    let seconds = fastest(args.repetitions.into(), || generation.run())?;
     let ms_per_frame = seconds * 1e3 / FRAMES as f64;
     let frames_per_second = (FRAMES * batch) as f64 / seconds;
     let result = serde_json::json!({
@@ -145,19 +140,6 @@ pub fn generate(args: GenerateArgs) -> anyhow::Result<()> {
          {frames_per_second:.0} frames/s"
     );
     print(args.json, &result, &text)
-}
-
-/// Seconds of the fastest run of `repetitions`, after one to warm up.
-fn fastest(
-    repetitions: u16,
-    mut run: impl FnMut() -> anyhow::Result<Duration>,
-) -> anyhow::Result<f64> {
-    run()?;
-    let mut seconds = f64::INFINITY;
-    for _ in 0..repetitions {
-        seconds = seconds.min(run()?.as_secs_f64());
-    }
-    Ok(seconds)
 }
 
 /// Prints a result as a line of JSON or as text.

@@ -34,12 +34,7 @@ pub fn run(args: BvhArgs) -> anyhow::Result<()> {
     let Action::Inspect { file, units } = args.action;
     let document = bvh::read(&file)?;
     let named = |oddity| format!("{}: {oddity}", document.name());
-    warn(
-        &oddities(&document.to_clip())
-            .into_iter()
-            .map(named)
-            .collect::<Vec<_>>(),
-    );
+    warn(oddities(&document.to_clip()).into_iter().map(named));
     let inspection = Inspection {
         document: &document,
         unit: units.unit.unwrap_or_default(),

@@ -9,10 +9,11 @@ use clap::Args;
 
 use crate::data::choreography::{ChoreographyConfig, clips};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
+use crate::run::check_output_folder;
 
 #[derive(Debug, Args)]
 pub struct ChoreographyArgs {
-    /// Folder for the clips, made where there is none; files of the same names are replaced
+    /// Folder for the clips, made where there is none
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Number of clips; styles take turns
@@ -24,6 +25,9 @@ pub struct ChoreographyArgs {
     /// Other numbers give other dances
     #[arg(long, default_value_t = ChoreographyConfig::default().seed)]
     seed: u64,
+    /// Write into a folder that holds files, and replace those of the same names
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
@@ -35,6 +39,7 @@ pub fn run(args: ChoreographyArgs) -> anyhow::Result<()> {
         seed: args.seed,
     };
     let clips = clips(&config)?;
+    check_output_folder(&args.out, args.force)?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{} cannot be created", args.out.display()))?;
     let mut out = std::io::stdout();

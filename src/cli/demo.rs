@@ -14,7 +14,7 @@ use super::notice::notice;
 use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::data::{DataPart, Dataset, Recording};
+use crate::data::{DataPart, Dataset};
 use crate::evaluation::{ProtocolScores, Tables};
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
@@ -57,20 +57,12 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let settings = DemoSettings::new(args.reduced, args.fraction)?;
     let config = &settings.experiment;
     let mut out = std::io::stdout();
+    demo::check_folder(&args.out)?;
     let run = RunFolder::replace(&args.out, config)?;
-    demo::remove_results(run.path())?;
+    demo::begin_results(run.path(), &settings)?;
 
     let dataset = settings.dataset()?;
-    let of = |clips: &[Recording]| clips.iter().map(Recording::frames).sum::<usize>() as u64;
-    writeln!(
-        out,
-        "{} clips to train on ({} frames), {} to test on ({} frames), generated from seed {}",
-        dataset.train.len(),
-        thousands(of(&dataset.train)),
-        dataset.test.len(),
-        thousands(of(&dataset.test)),
-        settings.choreography.seed
-    )?;
+    writeln!(out, "{}", settings.summary(&dataset))?;
     let (untrained, losses) = train(config, &dataset, args.threads.count(), &run)?;
     demo::write_losses(run.path(), &losses)?;
 

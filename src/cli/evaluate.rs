@@ -8,14 +8,14 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::clip_choice::ClipChoice;
-use super::notice::{notice, warn};
+use super::notice::warn;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{
     EvaluatedData, EvaluationOptions, EvaluationRecord, ProtocolScores, TableRow, Tables,
 };
-use crate::run::Subject;
+use crate::run::{Subject, check_outputs};
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -53,6 +53,9 @@ pub struct EvaluateArgs {
     /// Evaluate on other data than the run was trained on, or split otherwise
     #[arg(long)]
     other_data: bool,
+    /// Replace files, and scores on other clips, that are there already
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -62,12 +65,8 @@ pub struct EvaluateArgs {
 /// then. A file cannot be written.
 pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
-    if subject.run.is_some() && args.out.is_some() {
-        anyhow::bail!(
-            "--out is for a config; {} is a run's folder and keeps its scores itself",
-            args.run.display()
-        );
-    }
+    let inputs = subject.files();
+    check_outputs(&args.json, inputs.iter().chain([&args.data]), args.force)?;
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
     warn(&dataset.warnings);
     if !args.other_data {
@@ -76,6 +75,10 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     let mut out = std::io::stdout();
     let part = DataPart::from(args.clips);
     let data = EvaluatedData::of(&dataset, part)?;
+    let folder = subject.scores_folder(args.out.as_deref(), &data, args.force)?;
+    if subject.run.is_some() && folder.is_none() {
+        warn(["the run keeps its scores on other clips; --force replaces them"]);
+    }
     writeln!(
         out,
         "{} on {} {} clips, {} frames\n",
@@ -100,9 +103,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     for protocol in &protocols {
         let evaluation =
             pool.install(|| evaluate_watched(&**protocol, &*subject.model, &dataset, part))?;
-        for warning in &evaluation.warnings {
-            notice(format_args!("warning: {warning}"));
-        }
+        warn(&evaluation.warnings);
         scores.push((protocol.name(), evaluation.scores));
     }
     let scores = ProtocolScores::new(scores);
@@ -121,18 +122,16 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
         )?;
     }
     let record = EvaluationRecord { scores, data };
-    if let Some(path) = &args.json {
-        record.write_scores(path)?;
-    }
     let all = args.lengths.is_empty() && args.windows.is_none() && args.protocol.is_empty();
     let of_its_own = match &subject.run {
         Some(run) => all && *run.config()?.model == *subject.config.model,
         None => true,
     };
-    if let Some(folder) = subject.scores_folder(args.out.as_deref())?
-        && of_its_own
-    {
-        record.write(folder)?;
+    if let Some(folder) = folder.filter(|_| of_its_own) {
+        subject.write_scores(folder, &record)?;
+    }
+    if let Some(path) = &args.json {
+        record.write_scores(path)?;
     }
     Ok(())
 }

@@ -3,14 +3,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::warn;
 use crate::data::Dataset;
-use crate::models::transition::exported_batch::{ExportError, ExportedBatch, export_batch};
+use crate::models::transition::exported_batch::{ExportedBatch, export_batch};
 use crate::models::transition::{DanceClip, Forcing, TransitionSettings};
-use crate::run::{RunFolder, replace_file};
+use crate::run::{RunFolder, check_outputs, replace_file};
 
 #[derive(Debug, Args)]
 pub struct ExportBatchArgs {
@@ -31,12 +31,17 @@ pub struct ExportBatchArgs {
     /// Feed the true frames instead of the model's predictions
     #[arg(long)]
     ground_truth: bool,
+    /// Replace the file where it is there already
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
 /// The run or the data cannot be used; no clip is long enough; the file cannot be written.
 pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let run = RunFolder::open(&args.run);
+    let inputs = run.parts();
+    check_outputs([&args.out], inputs.iter().chain([&args.data]), args.force)?;
     let config = run.config()?;
     let settings = TransitionSettings::of(&config);
     let settings = settings.context("only a model of transitions has batches to export")?;
@@ -52,13 +57,6 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
             false => Forcing::FreeRunning,
         },
     };
-    match export_batch(&model, settings.model.root_frame(), &clips, &batch) {
-        Ok(file) => Ok(replace_file(&args.out, &file)?),
-        Err(ExportError::TooShort { frames }) => bail!(
-            "no training clip of {} has the {} frames that --frames {frames} needs",
-            args.data.display(),
-            frames + 1
-        ),
-        Err(other) => Err(other.into()),
-    }
+    let file = export_batch(&model, settings.model.root_frame(), &clips, &batch)?;
+    Ok(replace_file(&args.out, file)?)
 }

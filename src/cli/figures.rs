@@ -11,8 +11,8 @@ use super::notice::warn;
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::models::registry;
-use crate::report::figures::{DrawnFigures, FigureRequest, index};
-use crate::run::{Subject, replace_file};
+use crate::report::figures::FigureRequest;
+use crate::run::{Subject, check_output_folder, check_outputs, replace_file};
 
 /// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
 ///
@@ -51,6 +51,9 @@ pub struct FiguresArgs {
     /// Take other data than the run was trained on
     #[arg(long)]
     other_data: bool,
+    /// Replace figures and page where they are there already
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -65,6 +68,10 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         .iter()
         .map(|path| Subject::open(path, &[]))
         .collect::<Result<_, _>>()?;
+    let models = compared.iter().chain([&subject]);
+    let inputs: Vec<PathBuf> = models.flat_map(Subject::files).collect();
+    check_outputs(&args.viewer, inputs.iter().chain([&args.data]), args.force)?;
+    check_output_folder(&args.out, args.force)?;
     let kind = registry::find(subject.config.model.kind());
     let paper = kind.context("the model is not in the registry")?.paper();
     let draw = paper
@@ -86,24 +93,19 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         start: args.start,
         page: args.viewer.is_some(),
     };
-    let DrawnFigures { figures, page } = args.threads.pool()?.install(|| draw(&asked))?;
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("{} cannot be created", args.out.display()))?;
-    for figure in &figures {
-        figure.write(&args.out)?;
-    }
+    let drawn = args.threads.pool()?.install(|| draw(&asked))?;
     let about = format!(
         "{} on {} test clips of the data with digest {}.",
         subject.what,
         dataset.test.len(),
         dataset.digest
     );
-    replace_file(&args.out.join("index.md"), index(&figures, &about))?;
-    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+    drawn.write(&args.out, &about)?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(drawn.page) {
         replace_file(path, page)?;
     }
     let mut out = std::io::stdout();
-    for figure in &figures {
+    for figure in &drawn.figures {
         writeln!(out, "{}", figure.caption)?;
     }
     writeln!(out, "{}", args.out.display())?;

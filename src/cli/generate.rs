@@ -12,12 +12,11 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::file_units::FileUnits;
-use super::notice::{notice, warn};
+use super::notice::warn;
 use crate::models::transition::DataRanges;
-use crate::motion::Clip;
-use crate::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
+use crate::motion::bvh;
 use crate::report::viewer::generated_page;
-use crate::run::{Subject, replace_file, write_json};
+use crate::run::{Subject, beside_clips, check_outputs, replace_file, write_json};
 use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, Summary, SynthesisOptions, control_warnings, synthesise};
 use keyframes::KeyframeArgs;
@@ -60,6 +59,9 @@ pub struct GenerateArgs {
     /// model.velocity_refinement=false; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Replace files that are there already
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
@@ -67,8 +69,19 @@ pub struct GenerateArgs {
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
+    subject.check_features()?;
+    let choice = args.keyframes.choice();
+    let (mut inputs, own) = (choice.files(), subject.files());
+    inputs.extend(&own);
+    let TrajectoryArgs { trajectory, .. } = &args.trajectory;
+    inputs.extend(trajectory.iter().chain(&args.velocity.velocity_csv));
+    inputs.extend(args.velocity.velocity_from.iter().map(|from| &from.file));
+    let outputs = args.viewer.iter().chain(&args.json).chain([&args.out]);
+    check_outputs(outputs, inputs.iter().copied(), args.force)?;
+    subject.check_no_clip(&args.out)?;
+    warn(beside_clips(&args.out, &inputs));
     let data = args.units.over(&subject.config.data);
-    let keyframes = Keyframes::read(&args.keyframes.choice(), &data)?;
+    let keyframes = Keyframes::read(&choice, &data)?;
     warn(keyframes.notices());
     let request = keyframes.request(&args.keyframes.length)?;
     let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
@@ -81,15 +94,14 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
     warnings.extend(unread.map(ControlWarning::Unread));
     warnings.extend(control_warnings(&request, ranges.as_ref()));
-    for warning in &warnings {
-        notice(format_args!("warning: {warning}"));
-    }
+    warn(&warnings);
     let options = SynthesisOptions {
         foot_cleanup: args.foot_cleanup,
     };
     let name = args.out.file_name().unwrap_or_default().to_string_lossy();
     let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
-    let document = document(&sequence.clip, keyframes.channels())?;
+    let document = keyframes.document(&sequence.clip);
+    let document = document.context("the motion cannot be written")?;
     let page = || generated_page(&subject, &keyframes, &request, &sequence, &options);
     let page = args.viewer.as_ref().map(|_| page()).transpose()?;
     bvh::write(&args.out, &document)?;
@@ -102,14 +114,4 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     }
     writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())
-}
-
-/// The clip as a document with the input's channels, or with Z X Y rotations where the input has no
-/// such hierarchy.
-fn document(clip: &Clip, channels: Option<&[Vec<Channel>]>) -> anyhow::Result<Bvh> {
-    let channels = match channels {
-        Some(channels) => channels.to_vec(),
-        None => channel_layout(clip, [Axis::Z, Axis::X, Axis::Y]),
-    };
-    Bvh::from_clip(clip, channels).context("the motion cannot be written")
 }

@@ -10,7 +10,7 @@ pub fn notice(line: impl Display) {
 }
 
 /// Warnings that the library gives beside what it read, a line each on stderr.
-pub fn warn(warnings: &[String]) {
+pub fn warn(warnings: impl IntoIterator<Item: Display>) {
     for warning in warnings {
         notice(format_args!("warning: {warning}"));
     }

@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::notice::{notice, warn};
 use super::progress::Progress;
-use super::stop::{Stop, interrupted, quote};
+use super::stop::{Stop, command_line, interrupted};
 use super::threads::Threads;
 use super::train;
 use super::watched::evaluate_watched;
@@ -66,6 +66,9 @@ pub struct ReproduceArgs {
     /// depends on it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
+    /// Write into a folder that holds other files or tables of other rows, and replace the tables
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -126,6 +129,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         no_training: args.no_training,
         observer: &terminal,
     };
+    reproduction.check_out(args.force)?;
     let ending = reproduction.run().map_err(|error| match error {
         // By itself: whether the output is closed is seen from its kind.
         ReproduceError::Output(error) => error.into(),
@@ -137,12 +141,8 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Ending::Stopped => {
-            // The command as it was given.
-            let words = std::env::args().skip(1).map(|word| quote(&word));
-            let command = words.collect::<Vec<_>>().join(" ");
-            notice(format_args!(
-                "stopped and saved; go on with\n  keydance {command}"
-            ));
+            let command = command_line();
+            notice(format_args!("stopped and saved; go on with\n  {command}"));
             Ok(interrupted())
         }
         Ending::Diverged(error) => Err(anyhow::Error::new(error).context("a training diverged")),

@@ -44,8 +44,14 @@ pub fn interrupted() -> ExitCode {
     ExitCode::from(INTERRUPTED)
 }
 
-/// A word for the shell.
-pub fn quote(word: &str) -> String {
+/// The command as it was given, for the shell.
+pub fn command_line() -> String {
+    let words = std::env::args_os().skip(1);
+    let words = words.map(|word| format!(" {}", quote(&word.to_string_lossy())));
+    format!("keydance{}", words.collect::<String>())
+}
+
+fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-/=:,+@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         word.into()

@@ -9,7 +9,7 @@ use clap::Args;
 
 use crate::evaluation::{TableRow, Tables};
 use crate::experiment::EvaluatedRun;
-use crate::run::replace_file;
+use crate::run::{RunFolder, check_outputs, replace_file};
 
 #[derive(Debug, Args)]
 pub struct TablesArgs {
@@ -19,12 +19,18 @@ pub struct TablesArgs {
     /// Where to write the tables, Markdown
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Replace the tables where they are there already
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
 /// A folder has no scores, or the scores are of different data; nothing is written then. The file
 /// cannot be written.
 pub fn run(args: TablesArgs) -> anyhow::Result<()> {
+    let parts = |run: &PathBuf| RunFolder::open(run).parts();
+    let inputs: Vec<PathBuf> = args.runs.iter().flat_map(parts).collect();
+    check_outputs([&args.out], &inputs, args.force)?;
     let runs = EvaluatedRun::read_all(&args.runs)?;
     let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();
     let first = runs.first().context("no run was given")?;

@@ -2,14 +2,14 @@
 
 use std::io::{self, Write as _};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 
 use super::notice::{notice, warn};
 use super::progress::Progress;
-use super::stop::{Stop, interrupted, quote};
+use super::stop::{Stop, command_line, interrupted};
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
@@ -77,8 +77,9 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         Outcome::Stopped => {
             let (done, all) = (trainer.steps_done(), trainer.task().steps());
             notice(format_args!(
-                "stopped and saved after step {done} of {all}; go on with\n  {}",
-                resume_command(&args)
+                "stopped and saved after step {done} of {all}; go on with\n  {}{}",
+                command_line(),
+                if args.resume { "" } else { " --resume" }
             ));
             Ok(interrupted())
         }
@@ -100,9 +101,7 @@ pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
         task.steps(),
         task.frame_steps(),
     )?;
-    for warning in task.warnings() {
-        notice(format_args!("warning: {warning}"));
-    }
+    warn(task.warnings());
     Ok(())
 }
 
@@ -117,25 +116,4 @@ pub fn goes_on(resumed: &Resumed) -> io::Result<()> {
         ));
     }
     writeln!(io::stdout(), "goes on after step {}", resumed.steps)
-}
-
-/// The command that goes on where `args` stopped.
-fn resume_command(args: &TrainArgs) -> String {
-    let path = |path: &Path| quote(&path.to_string_lossy());
-    let mut command = format!(
-        "keydance train {} --data {} --out {}",
-        path(&args.config),
-        path(&args.data),
-        path(&args.out)
-    );
-    if let Some(budget) = &args.budget {
-        command += &format!(" --budget {}", path(budget));
-    }
-    for set in &args.set {
-        command += &format!(" --set {}", quote(set));
-    }
-    if let Some(threads) = args.threads.threads {
-        command += &format!(" --threads {threads}");
-    }
-    command + " --resume"
 }

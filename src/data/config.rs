@@ -1,10 +1,8 @@
 //! The `[data]` table of an experiment's config.
 
-use std::path::PathBuf;
-
 use serde::{Deserialize, Serialize};
 
-use crate::motion::{FeatureConfig, Unit, Up};
+use crate::motion::{FeatureConfig, Mapping, Unit, Up};
 
 /// How clips are read, measured and split.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,9 +18,10 @@ pub struct DataConfig {
     pub split: Split,
     /// Share of the training clips that is kept aside for validation, at least 0 and below 1.
     pub validation_share: f64,
-    /// Mapping file for clips on another skeleton than the dance skeleton.
+    /// For clips on another skeleton than the dance skeleton: what a mapping file says. A config may
+    /// give the file's path, relative to itself; a run holds the content.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mapping: Option<PathBuf>,
+    pub mapping: Option<Mapping>,
     /// Unit of the files' lengths: "cm", "m", "mm", "in"; "auto" recognises it by the body's
     /// height.
     #[serde(skip_serializing_if = "is_default")]

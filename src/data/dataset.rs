@@ -151,6 +151,16 @@ impl Dataset {
         Ok(dataset)
     }
 
+    /// The [digest](Dataset::digest) of all clips in a folder; none where they cannot be read.
+    pub fn digest_of(folder: &Path) -> Option<String> {
+        let read = |(name, path)| Some((name, file_digest(&std::fs::read(path).ok()?)));
+        let clips = clip_files(folder).ok()?.into_iter().map(read);
+        let clips: Vec<(String, String)> = clips.collect::<Option<_>>()?;
+        Some(digest(
+            clips.iter().map(|(name, digest)| (&**name, &**digest)),
+        ))
+    }
+
     /// Splits clips that are in memory, such as generated ones, by their names: by the same rule as
     /// files.
     ///
@@ -184,11 +194,10 @@ impl Dataset {
         read: impl Fn(&String, Option<&Mapping>) -> Result<ReadClip, DataError> + Sync,
     ) -> Result<Self, DataError> {
         let parts = split(names, origin, config)?;
-        let mapping = config.mapping.as_deref().map(Mapping::read).transpose()?;
         let read = |names: &Vec<String>| -> Result<Vec<ReadClip>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
-                .map(|name| read(name, mapping.as_ref()))
+                .map(|name| read(name, config.mapping.as_ref()))
                 .collect();
             clips.into_iter().collect()
         };
@@ -199,7 +208,7 @@ impl Dataset {
         } = &parts;
         let (train, validation, test) = (read(train)?, read(validation)?, read(test)?);
         let all = || train.iter().chain(&validation).chain(&test);
-        let digest = digest(all());
+        let digest = digest(all().map(|clip| (clip.recording.name(), &*clip.digest)));
         let warnings = grouped(all().map(|clip| (clip.recording.name(), &clip.notices[..])));
         let clips = |part: Vec<ReadClip>| part.into_iter().map(|clip| clip.recording).collect();
         let dataset = Self {
@@ -238,7 +247,7 @@ fn read_clip(
     let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
     Ok(ReadClip {
         recording,
-        digest: hexadecimal(&Sha256::digest(&bytes)),
+        digest: file_digest(&bytes),
         notices,
     })
 }
@@ -257,16 +266,20 @@ fn pose_digest(clip: &Clip) -> String {
     hexadecimal(&hash.finalize())
 }
 
-fn digest<'a>(clips: impl Iterator<Item = &'a ReadClip>) -> String {
-    let mut lines: Vec<(&str, &str)> = clips
-        .map(|clip| (clip.recording.name(), clip.digest.as_str()))
-        .collect();
+/// SHA-256 over clips by their names and digests, hexadecimal.
+fn digest<'a>(clips: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    let mut lines: Vec<(&str, &str)> = clips.collect();
     lines.sort_unstable();
     let list: String = lines
         .into_iter()
         .map(|(name, digest)| format!("{digest}  {name}\n"))
         .collect();
     hexadecimal(&Sha256::digest(list.as_bytes()))
+}
+
+/// SHA-256 of a file's content, hexadecimal.
+pub(crate) fn file_digest(content: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(content))
 }
 
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {

@@ -11,7 +11,7 @@ const DEEPEST: usize = 6;
 
 /// The BVH files in a folder by their names, sorted bytewise. A name that is not UTF-8 has U+FFFD
 /// in place of what is not.
-pub(super) fn clip_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
+pub(crate) fn clip_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
     let mut files = BTreeMap::new();
     for path in entries(folder)?.iter().map(DirEntry::path) {
         if !is_clip(&path) {
@@ -73,7 +73,8 @@ fn clips_below(folder: &Path, depth: usize) -> Vec<PathBuf> {
     found
 }
 
-fn is_clip(path: &Path) -> bool {
+/// Whether a data folder reads a file as a clip.
+pub(crate) fn is_clip(path: &Path) -> bool {
     let hidden = path.file_name().unwrap_or_default().to_string_lossy();
     let is_bvh = |end: &std::ffi::OsStr| end.eq_ignore_ascii_case("bvh");
     path.extension().is_some_and(is_bvh) && !hidden.starts_with('.') && !path.is_dir()

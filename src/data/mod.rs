@@ -10,7 +10,8 @@ mod split;
 mod twins;
 
 pub use config::{DataConfig, Split};
-pub(crate) use dataset::hexadecimal;
 pub use dataset::{DataError, Dataset, Recording};
+pub(crate) use dataset::{file_digest, hexadecimal};
+pub(crate) use folder::{clip_files, is_clip};
 pub use part::{DataPart, EmptyPart};
 pub use reading::FileReading;

@@ -113,6 +113,13 @@ impl EvaluationRecord {
         folder.join(scores).exists()
     }
 
+    /// Whether a folder has scores on that part of data, but on other clips.
+    pub fn is_of_other_clips(folder: &Path, data: &EvaluatedData) -> bool {
+        let [_, file] = Self::files(data.part);
+        let clips = |data: &EvaluatedData| (data.clips, data.frames, data.data_digest.clone());
+        read_json(folder, file).is_ok_and(|theirs: EvaluatedData| clips(&theirs) != clips(data))
+    }
+
     /// Writes both files into a folder that exists.
     ///
     /// # Errors

@@ -1,6 +1,8 @@
 //! An experiment's config: what is trained, on what, how. What concerns one model alone is the
 //! model's own.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
 use crate::data::DataConfig;
@@ -31,6 +33,9 @@ pub struct ExperimentConfig {
     /// Left out: a training does not score itself on validation clips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<ValidationConfig>,
+    /// The files that it was read from, those of its bases, budget and mapping among them.
+    #[serde(skip)]
+    pub files: Vec<PathBuf>,
 }
 
 /// What every experiment has, whatever its model.

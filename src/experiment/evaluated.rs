@@ -43,7 +43,7 @@ impl EvaluatedRun {
         let run = RunFolder::open(folder);
         let record = EvaluationRecord::read(folder)?;
         Ok(Self {
-            config: run.config()?,
+            config: run.config_of_weights()?,
             manifest: run.manifest()?,
             record,
             folder: folder.into(),

@@ -2,6 +2,7 @@
 //! keys refused.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error as _;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use toml::{Table, Value};
 use super::config::{ExperimentConfig, Shared};
 use crate::models::registry;
 use crate::models::settings::ModelKind;
+use crate::motion::{Mapping, MappingError};
 
 /// The key that names the file that a config overrides.
 const BASE: &str = "base";
@@ -19,8 +21,8 @@ const BASE: &str = "base";
 const LARGEST_FILE: u64 = 1 << 20;
 /// Most parts of a dotted key on the command line.
 const DEEPEST_KEY: usize = 16;
-/// Tables whose only key is a choice: one layer's choice replaces that of the layer below.
-const CHOICES: [&str; 1] = ["data.split"];
+/// Tables that are one thing: a layer's replaces that of the layer below.
+const WHOLE: [&str; 2] = ["data.split", "data.mapping"];
 
 /// Why there is no config.
 #[derive(Debug, Error)]
@@ -36,12 +38,50 @@ pub enum ConfigError {
 struct Layer {
     origin: String,
     table: Table,
+    /// The files that say so.
+    files: Vec<PathBuf>,
+}
+
+impl Layer {
+    /// A layer with a mapping file's content in the place of its path, which counts from `folder`:
+    /// so a config means the same wherever it is used, and whatever becomes of the file.
+    fn new(origin: String, mut table: Table, folder: &Path) -> Result<Self, ConfigError> {
+        let mut files = Vec::new();
+        let data = table.get_mut("data").and_then(Value::as_table_mut);
+        if let Some(value) = data.and_then(|data| data.get_mut("mapping"))
+            && let Some(path) = value.as_str()
+        {
+            let path = folder.join(path);
+            let mapping = Mapping::read(&path).map_err(|error| {
+                let what_to_do = match &error {
+                    MappingError::Read { .. } => {
+                        "; the path counts from the config's folder, in the run of an earlier \
+                         version, too: put the mapping file that it was made with there"
+                    }
+                    _ => "",
+                };
+                let cause = error.source().map(|cause| format!(": {cause}"));
+                let cause = cause.unwrap_or_default();
+                ConfigError::Refused(format!(
+                    "{origin}: data.mapping: {error}{cause}{what_to_do}"
+                ))
+            })?;
+            *value = Value::try_from(mapping)?;
+            files.push(path);
+        }
+        Ok(Self {
+            origin,
+            table,
+            files,
+        })
+    }
 }
 
 impl ExperimentConfig {
-    /// Reads a TOML file. A top-level key `base` names another file, relative to this one, that it
-    /// overrides; keys that no file names have the paper's values. `sets` are overrides
-    /// `a.b.c=value` on top: a value is TOML, a bare word is a string.
+    /// Reads a TOML file. A top-level key `base` names another file that it overrides; keys that no
+    /// file names have the paper's values. Paths in a file are relative to it. `sets` are overrides
+    /// `a.b.c=value` on top: a value is TOML, a bare word is a string, a path is relative to the
+    /// current folder.
     ///
     /// # Errors
     /// A file cannot be read or is not TOML; a key is unknown or has a value of the wrong kind or
@@ -79,15 +119,18 @@ impl ExperimentConfig {
         resolve(&layers.collect::<Result<Vec<_>, _>>()?)
     }
 
-    /// Reads a config from TOML text, without a base.
+    /// Reads a config from TOML text, without a base; a path in it counts from the current folder.
     ///
     /// # Errors
     /// As [`ExperimentConfig::load`]; `origin` names the text in them.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        resolve(&[Layer {
-            table: parse_table(text, origin)?,
-            origin: origin.into(),
-        }])
+        Self::parse_in(Path::new(""), text, origin)
+    }
+
+    /// The same where a path in it counts from `folder`.
+    pub(crate) fn parse_in(folder: &Path, text: &str, origin: &str) -> Result<Self, ConfigError> {
+        let table = parse_table(text, origin)?;
+        resolve(&[Layer::new(origin.into(), table, folder)?])
     }
 
     /// The config as TOML with every key, which reads back as the same config.
@@ -193,19 +236,19 @@ fn read_layers(
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
     let mut table = parse_table(&text, &origin)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
     match table.remove(BASE) {
         None => {}
-        Some(Value::String(base)) => {
-            let folder = path.parent().unwrap_or(Path::new(""));
-            read_layers(&folder.join(base), above, layers)?;
-        }
+        Some(Value::String(base)) => read_layers(&folder.join(base), above, layers)?,
         Some(other) => {
             return Err(ConfigError::Refused(format!(
                 "{origin}: base = {other}: expected the name of a file in quotes"
             )));
         }
     }
-    layers.push(Layer { origin, table });
+    let mut layer = Layer::new(origin, table, folder)?;
+    layer.files.push(path.into());
+    layers.push(layer);
     Ok(())
 }
 
@@ -234,10 +277,8 @@ fn set_layer(set: &str) -> Result<Layer, ConfigError> {
     let within = |value, part: &&str| Table::from_iter([(part.trim().to_string(), value)]);
     let inner = inner.iter().rev();
     let value = inner.fold(value, |value, part| Value::Table(within(value, part)));
-    Ok(Layer {
-        origin: format!("--set {set}"),
-        table: within(value, &outermost),
-    })
+    let table = within(value, &outermost);
+    Layer::new(format!("--set {set}"), table, Path::new(""))
 }
 
 /// Merges the layers onto the defaults and checks after each, so that an error names the layer that
@@ -253,6 +294,7 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     for Layer {
         origin,
         table: above,
+        ..
     } in layers
     {
         if let Some(named) = above.get("model").and_then(|model| model.get("kind"))
@@ -281,6 +323,10 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     })?;
     // A budget is over any model; what it says of a part that this one lacks makes no other
     // experiment of it.
+    config.files = layers
+        .iter()
+        .flat_map(|layer| layer.files.clone())
+        .collect();
     let groups = config.model.rate_groups();
     let rates = &mut config.optimiser.rates;
     rates.retain(|group, _| groups.contains(&group.as_str()));
@@ -319,22 +365,23 @@ fn parse_layer(
     };
     let own = kind.defaults();
     let keys = table.clone().into_iter();
-    let (own, mut shared): (Table, Table) = keys.partition(|(key, _)| own.contains_key(key));
+    let (given, mut shared): (Table, Table) = keys.partition(|(key, _)| own.contains_key(key));
     shared.entry("name").or_insert(kind.default_name().into());
     let shared: Shared = shared.try_into().map_err(unread)?;
     let config = ExperimentConfig {
         name: shared.name,
         seed: shared.seed,
         data: shared.data,
-        model: kind.read(own).map_err(unread)?,
+        model: kind.read(given.clone()).map_err(unread)?,
         optimiser: shared.optimiser,
         checkpoint: shared.checkpoint,
         log: shared.log,
         validation: shared.validation,
+        files: Vec::new(),
     };
     // A model without fields takes any key without a word: what does not come back out was not
     // understood.
-    match missing(table, &config.to_table()?, "") {
+    match missing(&given, &config.model.tables()?, "") {
         Some(key) => Err(ConfigError::Refused(format!(
             "{origin}: unknown key {key}: remove it"
         ))),
@@ -375,9 +422,7 @@ fn merge(below: &mut Table, above: &Table, key: &str) {
     for (name, value) in above {
         let key = join(key, name);
         match (below.get_mut(name), value) {
-            (Some(Value::Table(below)), Value::Table(above))
-                if !CHOICES.contains(&key.as_str()) =>
-            {
+            (Some(Value::Table(below)), Value::Table(above)) if !WHOLE.contains(&key.as_str()) => {
                 merge(below, above, &key);
             }
             _ => {

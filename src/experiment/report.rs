@@ -5,15 +5,17 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use sha2::{Digest as _, Sha256};
+use serde_json::Value;
 
 use super::results::RowResults;
 use super::rows::Row;
 use super::{ReproduceError, Reproduction};
-use crate::data::hexadecimal;
+use crate::data::file_digest;
 use crate::evaluation::{EvaluationRecord, TableRow, Tables};
 use crate::report::{NO_TRAINING, schedule_note, score_figure};
-use crate::run::{FileError, Manifest, RunState, replace_file, write_json};
+use crate::run::{
+    FileError, Manifest, RunFolder, RunState, check_output_folder, replace_file, write_json,
+};
 
 const TABLES: &str = "tables.md";
 const MANIFEST: &str = "manifest.json";
@@ -55,6 +57,56 @@ struct ManifestRow<'r> {
 }
 
 impl Reproduction<'_> {
+    /// Refuses a folder for the results that holds others: tables and manifest would replace what
+    /// is there.
+    ///
+    /// # Errors
+    /// It is a run's, or holds results of another config; without `force`: it holds rows that are
+    /// not of this table, or files but no row of it.
+    pub fn check_out(&self, force: bool) -> Result<(), ReproduceError> {
+        let out = self.out.display();
+        let refused = |problem| Err(ReproduceError::Refused(format!("{out} {problem}")));
+        if self.out.join(RunFolder::CONFIG).exists() {
+            return refused("is a run's folder; give another --out".into());
+        }
+        for row in self.rows {
+            RowResults::of(row, self.out).read(row, self.dataset)?;
+        }
+        if force {
+            return Ok(());
+        }
+        let is_own = |folder: &str| self.rows.iter().any(|row| row.folder == folder);
+        let Ok(text) = std::fs::read_to_string(self.out.join(MANIFEST)) else {
+            // Stopped before its first tables, or not begun.
+            let begun = |row: &Row| {
+                let folders = [self.out.join(&row.folder), self.runs.join(&row.folder)];
+                folders.iter().any(|folder| folder.exists())
+            };
+            return match self.rows.iter().any(begun) {
+                true => Ok(()),
+                false => Ok(check_output_folder(self.out, false)?),
+            };
+        };
+        let manifest = serde_json::from_str(&text).unwrap_or(Value::Null);
+        let is_other = |row: &&Value| {
+            let folder = row["folder"].as_str();
+            row["done"] == true && folder.is_some_and(|folder| !is_own(folder))
+        };
+        let Some(rows) = manifest["rows"].as_array() else {
+            return refused(format!(
+                "has a {MANIFEST} that is not of tables; give another --out, or --force"
+            ));
+        };
+        match rows.iter().find(is_other) {
+            None => Ok(()),
+            Some(row) => refused(format!(
+                "holds tables with a row {}, which this command would leave out; give the configs \
+                 and --seeds of then, another --out, or --force",
+                row["folder"]
+            )),
+        }
+    }
+
     /// Writes tables, figures and manifest anew from what the rows have.
     ///
     /// # Errors
@@ -159,7 +211,7 @@ fn digests(out: &Path, files: &[PathBuf]) -> Result<BTreeMap<String, String>, Fi
         let content = std::fs::read(path).map_err(FileError::at(path, "read"))?;
         let name = path.strip_prefix(out).unwrap_or(path);
         let name: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
-        Ok((name.join("/"), hexadecimal(&Sha256::digest(&content))))
+        Ok((name.join("/"), file_digest(&content)))
     };
     files.iter().map(digest).collect()
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::clip::{Clip, Pose};
@@ -60,8 +60,12 @@ pub enum MappingError {
     },
 }
 
-/// Where each of the 24 joints lies on another skeleton.
-#[derive(Debug, Clone, PartialEq)]
+/// What errors call a mapping that a config holds.
+const IN_CONFIG: &str = "data.mapping";
+
+/// Where each of the 24 joints lies on another skeleton. A config holds what a mapping file says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "MappingFile", into = "MappingFile")]
 pub struct Mapping {
     /// Name of the file, for errors.
     file: String,
@@ -74,19 +78,24 @@ pub struct Mapping {
     sources: Vec<Source>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MappingFile {
+    #[serde(skip_serializing_if = "Option::is_none")]
     scale: Option<f64>,
-    #[serde(default)]
+    #[serde(default, skip_serializing)]
     unit: Unit,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_undeclared")]
     up: Up,
     joints: BTreeMap<String, Source>,
 }
 
+fn is_undeclared(up: &Up) -> bool {
+    *up == Up::Auto
+}
+
 /// What stands for a joint.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "expected a joint's name in quotes, or { between = [name, name], at = share }"
@@ -96,7 +105,7 @@ enum Source {
     Between(Between),
 }
 
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Between {
     between: [String; 2],
@@ -136,10 +145,14 @@ impl Mapping {
     /// # Errors
     /// As [`Mapping::read`].
     pub fn parse(text: &str, file: &str) -> Result<Self, MappingError> {
-        let parsed: MappingFile = toml::from_str(text).map_err(|source| MappingError::Syntax {
+        let parsed = toml::from_str(text).map_err(|source| MappingError::Syntax {
             file: file.into(),
             source: Box::new(source),
         })?;
+        Self::of(parsed, file)
+    }
+
+    fn of(parsed: MappingFile, file: &str) -> Result<Self, MappingError> {
         let MappingFile {
             scale,
             unit,
@@ -333,6 +346,29 @@ impl Mapping {
             vec![DVec3::ZERO]
         } else {
             ends.iter().map(|end| *end * self.scale).collect()
+        }
+    }
+}
+
+impl TryFrom<MappingFile> for Mapping {
+    type Error = MappingError;
+
+    fn try_from(content: MappingFile) -> Result<Self, MappingError> {
+        Self::of(content, IN_CONFIG)
+    }
+}
+
+impl From<Mapping> for MappingFile {
+    fn from(mapping: Mapping) -> Self {
+        Self {
+            scale: mapping.has_unit.then_some(mapping.scale),
+            unit: Unit::Auto,
+            up: mapping.up,
+            joints: DANCE_JOINTS
+                .into_iter()
+                .map(String::from)
+                .zip(mapping.sources)
+                .collect(),
         }
     }
 }

@@ -27,6 +27,22 @@ pub enum Measured {
     EncoderLayers,
 }
 
+/// Seconds of the fastest of `repetitions` runs, after one to warm up.
+///
+/// # Errors
+/// As `run`.
+pub fn fastest<E>(
+    repetitions: usize,
+    mut run: impl FnMut() -> Result<Duration, E>,
+) -> Result<f64, E> {
+    run()?;
+    let mut seconds = f64::INFINITY;
+    for _ in 0..repetitions {
+        seconds = seconds.min(run()?.as_secs_f64());
+    }
+    Ok(seconds)
+}
+
 enum Layers {
     Lstm { lstm: Lstm, head: Linear },
     Encoder(Box<[TransformerEncoderLayer; 2]>),

@@ -5,13 +5,11 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
-
 use super::durable::{self, FileError};
 use super::error::RunError;
 use super::state::{self, Header, Moments};
 use crate::autograd::Parameters;
-use crate::data::hexadecimal;
+use crate::data::file_digest;
 use crate::models::weights::{self, SavedWeights};
 
 /// Name of the weights file, in a checkpoint and in a finished run.
@@ -53,11 +51,6 @@ impl Checkpoint {
             moments,
         })
     }
-}
-
-/// SHA-256 of a file's content, hexadecimal.
-pub(crate) fn file_digest(content: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(content))
 }
 
 /// What lies in a folder; nothing where there is no folder.

@@ -38,12 +38,25 @@ pub(crate) fn write_synced(path: &Path, content: &[u8]) -> Result<(), FileError>
     write().map_err(FileError::at(path, "written"))
 }
 
-/// Replaces a file by a whole new one: written beside it, then renamed.
+/// Replaces a file by a whole new one: written beside it, then renamed. A pipe or device is written
+/// to as it is.
 pub(crate) fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.partial"));
-    write_synced(&partial, content.as_ref())?;
-    rename(&partial, path)
+    // A link stays one.
+    let real = path.canonicalize().unwrap_or_else(|_| path.into());
+    if real.exists() && !real.is_file() {
+        let file = File::options().write(true).open(&real);
+        return file
+            .and_then(|mut file| file.write_all(content.as_ref()))
+            .map_err(FileError::at(path, "written"));
+    }
+    let name = real.file_name().unwrap_or_default().to_string_lossy();
+    let partial = real.with_file_name(format!(".{name}.partial"));
+    let written = write_synced(&partial, content.as_ref()).and_then(|()| rename(&partial, &real));
+    written.map_err(|error| {
+        // What is left of it takes room on a full disk.
+        let _ = fs::remove_file(&partial);
+        FileError::at(path, "written")(error.cause)
+    })
 }
 
 /// Writes JSON for people and scripts, with a final line end, there whole or not at all.

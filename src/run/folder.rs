@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use super::checkpoint::{self, WEIGHTS_FILE};
 use super::durable::{self, FileError};
 use super::error::RunError;
-use super::lock::FolderLock;
+use super::lock::{FolderLock, LOCK};
 use super::log::{self, LogLine};
 use super::manifest::{self, Build, Manifest};
 use crate::experiment::ExperimentConfig;
@@ -43,6 +43,10 @@ impl RunFolder {
     /// # Errors
     /// The folder holds a run already, another training writes to it, or it cannot be written.
     pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
+        // What no training has locked before stays without a lock.
+        if !path.join(LOCK).exists() {
+            Self::open(path).check_new()?;
+        }
         let run = Self::locked(path)?;
         run.begin(config)?;
         Ok(run)
@@ -97,15 +101,41 @@ impl RunFolder {
         })
     }
 
+    /// Whether a file is one of those that make up the run in a folder.
+    pub(super) fn has_part(folder: &Path, file: &Path) -> bool {
+        let inside = file.strip_prefix(folder).ok();
+        let name = inside.and_then(|inside| inside.iter().next());
+        let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
+        let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE, LOCK];
+        let is_own =
+            own.contains(&&*name) || name.starts_with("evaluation") && name.ends_with(".json");
+        is_own && folder.join(Self::CONFIG).is_file()
+    }
+
+    /// The files right in the folder that make up the run, those that are there.
+    pub fn parts(&self) -> Vec<PathBuf> {
+        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let files = entries.map(|entry| entry.path());
+        files
+            .filter(|file| Self::has_part(&self.path, file) && file.is_file())
+            .collect()
+    }
+
     fn begin(&self, config: &ExperimentConfig) -> Result<(), RunError> {
-        let own = [Self::CONFIG, CHECKPOINTS, WEIGHTS_FILE];
+        self.check_new()?;
+        self.write_config(config)
+    }
+
+    /// Refuses a folder that holds what a run would write.
+    fn check_new(&self) -> Result<(), RunError> {
+        let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE];
         if own.iter().any(|name| self.path.join(name).exists()) {
             return Err(RunError::Refused(format!(
                 "{} holds a run already; go on with --resume, or give another --out",
                 self.path.display()
             )));
         }
-        self.write_config(config)
+        Ok(())
     }
 
     /// Refuses a config that differs from the run's in these keys.

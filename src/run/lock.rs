@@ -9,7 +9,7 @@ use super::error::RunError;
 
 /// The file that a training holds locked while it writes to the folder. It stays there: only the
 /// lock counts, and that ends with the process, however it ends.
-const LOCK: &str = ".lock";
+pub(super) const LOCK: &str = ".lock";
 
 /// A folder that nobody else writes to while this lives.
 #[derive(Debug)]

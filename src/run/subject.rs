@@ -1,11 +1,13 @@
 //! The model that a command works with: a trained run's, or one that needs no training.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::durable::FileError;
 use super::error::RunError;
 use super::folder::RunFolder;
-use crate::data::Dataset;
+use super::output::{check_output_folder, place};
+use crate::data::{Dataset, is_clip};
+use crate::evaluation::{EvaluatedData, EvaluationRecord};
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 
@@ -60,6 +62,12 @@ impl Subject {
         })
     }
 
+    /// The files that it is read from.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let parts = self.run.iter().flat_map(RunFolder::parts);
+        parts.chain(self.config.files.iter().cloned()).collect()
+    }
+
     /// Refuses data that the run was not trained on: its training clips may be test clips there.
     ///
     /// # Errors
@@ -69,13 +77,8 @@ impl Subject {
         let Some(run) = &self.run else {
             return Ok(());
         };
-        let trained = run.config()?.data;
-        if trained != self.config.data {
-            let config = |data| ExperimentConfig {
-                data,
-                ..ExperimentConfig::default()
-            };
-            let differences = config(trained).differences(&config(self.config.data.clone()))?;
+        let differences = self.data_differences(run)?;
+        if !differences.is_empty() {
             return Err(RunError::Refused(format!(
                 "{} was trained on other clips or features of the data ({}; values there, values \
                  now), so some of these may be its training clips; give --other-data to use it on \
@@ -99,35 +102,116 @@ impl Subject {
         Ok(())
     }
 
-    /// The folder that keeps the scores: the run's, or for a config `out`, made with the config in
-    /// it; none where there is neither.
+    /// What differs from the `[data]` that the run was trained with.
+    fn data_differences(&self, run: &RunFolder) -> Result<Vec<String>, RunError> {
+        let trained = ExperimentConfig {
+            data: run.config()?.data,
+            ..self.config.clone()
+        };
+        Ok(trained.differences(&self.config)?)
+    }
+
+    /// Refuses a rate, or another key of the features, that the run was not trained with: its model
+    /// would misread every pose.
     ///
     /// # Errors
-    /// `out` holds another config, or cannot be written.
+    /// The key, with both values.
+    pub fn check_features(&self) -> Result<(), RunError> {
+        let Some(run) = &self.run else {
+            return Ok(());
+        };
+        let keys = ["data.fps:", "data.contact_threshold:", "data.facing_sigma:"];
+        let mut differences = self.data_differences(run)?;
+        differences.retain(|difference| keys.iter().any(|key| difference.starts_with(key)));
+        match &differences[..] {
+            [] => Ok(()),
+            _ => Err(RunError::Refused(format!(
+                "{} was trained on other features ({}; values there, values now); leave these out",
+                run.path().display(),
+                differences.join("; ")
+            ))),
+        }
+    }
+
+    /// Refuses a file that would be a clip in the folder that the run was trained on: with it the
+    /// folder is other data.
+    ///
+    /// # Errors
+    /// It would be.
+    pub fn check_no_clip(&self, file: &Path) -> Result<(), RunError> {
+        let place = place(file);
+        let folder = place.parent().filter(|_| is_clip(file));
+        let manifest = self.run.as_ref().map(RunFolder::manifest).transpose()?;
+        match folder.zip(manifest.flatten()) {
+            Some((folder, manifest))
+                if Dataset::digest_of(folder).as_ref() == Some(&manifest.data_digest) =>
+            {
+                Err(RunError::Refused(format!(
+                    "{} would be one of the clips that {} was trained on; give a file elsewhere",
+                    file.display(),
+                    manifest.name
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The folder for scores on `data`: the run's, or `out` for a config. None where there is
+    /// neither, or where the run has scores on other clips, which it keeps without `force`.
+    ///
+    /// # Errors
+    /// `out` is given for a run or holds another config; without `force`: scores on other clips, or
+    /// other files.
     pub fn scores_folder<'a>(
         &'a self,
         out: Option<&'a Path>,
+        data: &EvaluatedData,
+        force: bool,
     ) -> Result<Option<&'a Path>, RunError> {
-        if let Some(run) = &self.run {
-            return Ok(Some(run.path()));
-        }
-        let Some(folder) = out else {
-            return Ok(None);
+        let refused = |folder: &Path, problem: String| {
+            Err(RunError::Refused(format!("{} {problem}", folder.display())))
         };
-        std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
-        let run = RunFolder::open(folder);
-        if run.config_path().exists() {
-            let differences = run.config()?.differences(&self.config)?;
-            if !differences.is_empty() {
-                return Err(RunError::Refused(format!(
-                    "{} holds scores of another config ({}); values there, values now; give \
-                     another --out",
-                    folder.display(),
-                    differences.join("; ")
-                )));
-            }
+        let keeps = |folder: &&Path| force || !EvaluationRecord::is_of_other_clips(folder, data);
+        let Some(folder) = out else {
+            return Ok(self.run.as_ref().map(RunFolder::path).filter(keeps));
+        };
+        if let Some(run) = &self.run {
+            let problem = "is a run's folder and keeps its scores itself; --out is for a config";
+            return refused(run.path(), problem.into());
         }
-        run.write_config(&self.config)?;
-        Ok(Some(folder))
+        let earlier = RunFolder::open(folder);
+        if !earlier.config_path().exists() {
+            check_output_folder(folder, force)?;
+            return Ok(out);
+        }
+        let differences = earlier.config()?.differences(&self.config)?;
+        if !differences.is_empty() {
+            let problem = format!(
+                "holds scores of another config ({}); values there, values now; give another --out",
+                differences.join("; ")
+            );
+            return refused(folder, problem);
+        }
+        match keeps(&folder) {
+            true => Ok(out),
+            false => refused(
+                folder,
+                "holds scores on other clips; give another --out, or --force to replace them"
+                    .into(),
+            ),
+        }
+    }
+
+    /// Writes scores into the [folder for them](Subject::scores_folder); for a config it is made,
+    /// with the config in it.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_scores(&self, folder: &Path, record: &EvaluationRecord) -> Result<(), RunError> {
+        if self.run.is_none() {
+            std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
+            RunFolder::open(folder).write_config(&self.config)?;
+        }
+        Ok(record.write(folder)?)
     }
 }

@@ -51,19 +51,53 @@ impl RunFolder {
             .map_err(|error| self.or_other_version(error))
     }
 
+    /// The run's config, which says how its newest weights, if there are any, were trained.
+    ///
+    /// # Errors
+    /// A file cannot be read, or the config was edited since.
+    pub fn config_of_weights(&self) -> Result<ExperimentConfig, RunError> {
+        let config = self.config()?;
+        if let Ok(path) = self.newest_weights() {
+            self.check_unedited(&SavedWeights::read(&path)?)?;
+        }
+        Ok(config)
+    }
+
     fn read_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
-        let path = self.newest_weights()?;
-        let saved = SavedWeights::read(&path)?;
-        let path = path.display();
-        let trained = ExperimentConfig::parse(&saved.config, &format!("the config in {path}"))?;
-        let mut differences = trained.training_differences(config)?;
+        let saved = SavedWeights::read(&self.newest_weights()?)?;
+        let mut differences = self.config_of(&saved)?.training_differences(config)?;
         // Only the model's table concerns the weights.
         differences.retain(|difference| difference.starts_with("model."));
-        match differences.is_empty() {
-            true => Ok(saved),
-            false => Err(RunError::Refused(format!(
-                "{path} holds the weights of another model than the config describes ({}); values \
+        if !differences.is_empty() {
+            return Err(RunError::Refused(format!(
+                "{} holds the weights of another model than the config describes ({}); values \
                  there, values of the config",
+                saved.path.display(),
+                differences.join("; ")
+            )));
+        }
+        self.check_unedited(&saved)?;
+        Ok(saved)
+    }
+
+    /// The config that weights of the run were trained with.
+    pub(crate) fn config_of(&self, weights: &SavedWeights) -> Result<ExperimentConfig, RunError> {
+        let origin = format!("the config in {}", weights.path.display());
+        let config = ExperimentConfig::parse_in(self.path(), &weights.config, &origin);
+        Ok(config?)
+    }
+
+    /// Refuses a config that was edited since the weights were trained: what it says of data and
+    /// training would not be theirs.
+    fn check_unedited(&self, weights: &SavedWeights) -> Result<(), RunError> {
+        let trained = self.config_of(weights)?;
+        match &trained.training_differences(&self.config()?)?[..] {
+            [] => Ok(()),
+            differences => Err(RunError::Refused(format!(
+                "{} was edited since {} was trained ({}; values then, values now); set these back, \
+                 and use --set where a command is to take others",
+                self.config_path().display(),
+                weights.path.display(),
                 differences.join("; ")
             ))),
         }

@@ -9,9 +9,9 @@ use ndarray::{Array2, ArrayView2, s};
 use super::{KeyframeSource, SequenceRequest, SynthesisError};
 use crate::data::{DataConfig, DataError};
 use crate::models::transition::DanceClip;
-use crate::motion::bvh::{self, BvhError, Channel};
+use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
-use crate::motion::{Mapping, MappingError};
+use crate::motion::{Clip, Mapping, MappingError};
 
 /// Frames of a result at most: an hour at 30 a second.
 pub const LONGEST: u32 = 108_000;
@@ -57,6 +57,34 @@ pub struct KeyframeChoice {
     pub further: Vec<FileKeyframe>,
     /// For clips on another skeleton than the dance skeleton, in place of the data's.
     pub mapping: Option<PathBuf>,
+}
+
+impl KeyframeChoice {
+    /// The files that it names.
+    pub fn files(&self) -> Vec<&PathBuf> {
+        let motion = self.motion.iter().map(|(file, _)| file);
+        let further = self.further.iter().map(|keyframe| &keyframe.file);
+        motion.chain(further).chain(&self.mapping).collect()
+    }
+}
+
+/// A file, and the frame from which on it is read: "FILE.bvh[:FRAME]", without FRAME the first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileFrom {
+    pub file: PathBuf,
+    pub frame: usize,
+}
+
+impl FromStr for FileFrom {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let framed = text.rsplit_once(':');
+        let framed = framed.and_then(|(file, frame)| Some((file, frame.parse().ok()?)));
+        let (file, frame) = framed.unwrap_or((text, 0));
+        let file = file.into();
+        Ok(Self { file, frame })
+    }
 }
 
 /// Why files give no keyframes.
@@ -176,12 +204,15 @@ impl Keyframes {
                     .map(|keyframe| format!("{}:{}", keyframe.file.display(), keyframe.frame)),
             });
         }
-        let path = choice.mapping.as_deref().or(data.mapping.as_deref());
+        let mapping = match &choice.mapping {
+            Some(path) => Some(Mapping::read(path)?),
+            None => data.mapping.clone(),
+        };
         let mut read = Self {
             sources: BTreeMap::new(),
             keyframes,
             motion,
-            mapping: path.map(Mapping::read).transpose()?,
+            mapping,
             data: DataConfig {
                 skip_frames: 0,
                 ..data.clone()
@@ -280,10 +311,17 @@ impl Keyframes {
         runs_along.then(|| clip.features.slice(s![frames, ..]))
     }
 
-    /// The channels of the first keyframe's file, where they can hold the result.
-    pub fn channels(&self) -> Option<&[Vec<Channel>]> {
-        let first = self.keyframes.first()?;
-        self.sources[&first.file].channels.as_deref()
+    /// A result as a file's content: with the channels of the first keyframe's file, or with Z X Y
+    /// rotations where these cannot hold it.
+    ///
+    /// # Errors
+    /// The clip is not one that a file could hold.
+    pub fn document(&self, result: &Clip) -> Result<Bvh, BvhError> {
+        let first = self.keyframes.first();
+        let channels = first.and_then(|first| self.sources[&first.file].channels.clone());
+        let channels =
+            channels.unwrap_or_else(|| channel_layout(result, [Axis::Z, Axis::X, Axis::Y]));
+        Bvh::from_clip(result, channels)
     }
 
     /// The request: trajectory and velocity factors of the dancer's clip where there is one.

@@ -1,5 +1,6 @@
 //! How fast a training step is: the very step that a training runs, on made-up windows.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -10,6 +11,7 @@ use crate::autograd::Parameters;
 use crate::experiment::ExperimentConfig;
 use crate::models::{Streams, Task};
 use crate::nn::Initialiser;
+use crate::nn::measure::fastest;
 use crate::optim::Adam;
 
 /// A training step that can be timed again and again: forward, losses, backward and Adam.
@@ -94,6 +96,16 @@ pub struct StepSpeed {
     pub frame_steps_per_second: f64,
 }
 
+impl fmt::Display for StepSpeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
+            self.batch, self.frames, self.threads, self.seconds, self.frame_steps_per_second
+        )
+    }
+}
+
 /// Times `repetitions` steps after one to warm up.
 ///
 /// # Errors
@@ -106,11 +118,7 @@ pub fn step_speed(
     repetitions: usize,
 ) -> Result<StepSpeed, TrainingError> {
     let mut step = MeasuredStep::new(config, frames, batch, threads)?;
-    step.run()?;
-    let mut seconds = f64::INFINITY;
-    for _ in 0..repetitions {
-        seconds = seconds.min(step.run()?.as_secs_f64());
-    }
+    let seconds = fastest(repetitions, || step.run())?;
     Ok(StepSpeed {
         frames,
         batch,

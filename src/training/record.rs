@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::report::StepReport;
 use super::trainer::Trainer;
+use crate::data::file_digest;
 use crate::run::checkpoint;
 use crate::run::log::Log;
 use crate::run::manifest::{self, Manifest};
@@ -76,9 +77,9 @@ impl<'r> Record<'r> {
             epoch,
             position,
             frame_steps: trainer.frame_steps,
-            config_digest: checkpoint::file_digest(trainer.config_toml.as_bytes()),
+            config_digest: file_digest(trainer.config_toml.as_bytes()),
             data_digest: trainer.dataset.digest.clone(),
-            weights_file_digest: checkpoint::file_digest(&weights),
+            weights_file_digest: file_digest(&weights),
         };
         let state = state::encode(&header, trainer.adam.moments())?;
         let keep = trainer.config.checkpoint.keep;

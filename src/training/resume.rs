@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::trainer::Trainer;
-use crate::experiment::ExperimentConfig;
+use crate::data::file_digest;
 use crate::run::checkpoint::{self, Checkpoint};
 use crate::run::{RunError, RunFolder};
 
@@ -35,7 +35,7 @@ impl Trainer<'_> {
         for (_, path) in checkpoint::list(&run.checkpoints())?.into_iter().rev() {
             match Checkpoint::read(&path, &self.parameters) {
                 Ok(checkpoint) => {
-                    self.take_up(checkpoint, &path)?;
+                    self.take_up(checkpoint, &path, run)?;
                     for path in &aside {
                         checkpoint::set_aside(path)?;
                     }
@@ -60,17 +60,20 @@ impl Trainer<'_> {
         }
     }
 
-    fn take_up(&mut self, checkpoint: Checkpoint, path: &Path) -> Result<(), RunError> {
+    fn take_up(
+        &mut self,
+        checkpoint: Checkpoint,
+        path: &Path,
+        run: &RunFolder,
+    ) -> Result<(), RunError> {
         let Checkpoint {
             header,
             moments,
             weights,
         } = checkpoint;
-        let digest = checkpoint::file_digest(self.config_toml.as_bytes());
+        let digest = file_digest(self.config_toml.as_bytes());
         // Another version may write the same config with more keys.
-        if header.config_digest != digest
-            && ExperimentConfig::parse(&weights.config, "the checkpoint's config")? != self.config
-        {
+        if header.config_digest != digest && run.config_of(&weights)? != self.config {
             return Err(RunError::Refused(format!(
                 "{} belongs to a config with digest {}, the run's config has digest {digest}",
                 path.display(),

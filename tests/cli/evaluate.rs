@@ -389,7 +389,7 @@ fn clips_other_than_the_test_clips_are_named_in_the_json_and_have_files_of_their
         command.args(["--clips", clips, "--set"]);
         command.arg(format!("data.validation_share={share}"));
         command.arg("--out").arg(out.path().join("scores"));
-        command.arg("--json").arg(&file);
+        command.arg("--force").arg("--json").arg(&file);
         command
     };
     let of_validation = scored("validation", "0.25").assert().success();

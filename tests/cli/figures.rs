@@ -293,7 +293,7 @@ fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
         let mut command = keydance("generate");
         command.arg(FIXTURE.path("run")).arg("--motion").arg(&clip);
         command
-            .args(["--keyframes", "20,60,110", "--out"])
+            .args(["--keyframes", "20,60,110", "--force", "--out"])
             .arg(FIXTURE.path("out.bvh"));
         command
             .arg("--viewer")

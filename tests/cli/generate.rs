@@ -553,7 +553,8 @@ fn a_control_that_the_model_does_not_read_is_named() {
     let dance = |model: &str, control: [&str; 2]| {
         let mut command = three_keyframes(model);
         command.args(control);
-        command.arg("--out").arg(out.path().join("dance.bvh"));
+        command.arg("--force").arg("--out");
+        command.arg(out.path().join("dance.bvh"));
         command.assert().success()
     };
     dance("interpolation.toml", ["--velocity", "1.1"])
@@ -578,7 +579,8 @@ fn the_clips_of_the_choreography_can_be_written_as_files() {
         .assert()
         .success()
         .stdout(contains("choreography_000"));
-    write().assert().success();
+    write().assert().failure().stderr(contains("--force"));
+    write().arg("--force").assert().success();
     let files: Vec<PathBuf> = fs::read_dir(&folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())

@@ -61,7 +61,8 @@ fn as_blender_writes(mut clip: Clip) -> Clip {
 
 fn features(clip: &Path, npy: &Path, more: &[&str]) -> (Vec<f32>, String) {
     let mut command = keydance();
-    command.arg("features").arg(clip).arg("--npy").arg(npy);
+    command.args(["features", "--force"]);
+    command.arg(clip).arg("--npy").arg(npy);
     let output = command.args(more).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
     let array: ndarray::Array2<f32> = ndarray_npy::read_npy(npy).unwrap();

@@ -165,6 +165,43 @@ fn a_bad_mapping_is_named() {
 }
 
 #[test]
+fn a_config_holds_all_that_a_mapping_file_says() {
+    let between = "{ between = [\"Hips\", \"Spine2\"], at = 0.25 }";
+    let changed = [("Spine1", "\"Neck\""), ("Spine", between)];
+    for head in [
+        "unit = \"in\"\nup = \"z\"",
+        "scale = 3",
+        "up = \"y\"",
+        "unit = \"auto\"",
+    ] {
+        let read = Mapping::parse(&mapping(head, &changed), "map.toml").unwrap();
+        let config = DataConfig {
+            mapping: Some(read.clone()),
+            ..DataConfig::default()
+        };
+        let text = toml::to_string(&config).unwrap();
+        let held: DataConfig = toml::from_str(&text).unwrap();
+        assert_eq!(toml::to_string(&held).unwrap(), text);
+        let held = held.mapping.unwrap();
+        assert_eq!(
+            held.apply(&bent_clip()).unwrap(),
+            read.apply(&bent_clip()).unwrap()
+        );
+        assert_eq!(
+            (held.has_unit(), held.has_up()),
+            (read.has_unit(), read.has_up())
+        );
+    }
+    let text = toml::to_string(&Mapping::parse(&mapping("", &[]), "map.toml").unwrap()).unwrap();
+    let lacking = toml::from_str::<Mapping>(&text.replace("Head =", "Tail ="));
+    let message = lacking.unwrap_err().to_string();
+    assert!(
+        message.contains("data.mapping: [joints] names Tail"),
+        "{message}"
+    );
+}
+
+#[test]
 fn martial_arts_clips_go_through_the_pipeline() {
     let Some(folder) = martial_data::martial_folder() else {
         return;
@@ -173,7 +210,7 @@ fn martial_arts_clips_go_through_the_pipeline() {
     let mapping = Mapping::read(&path).unwrap();
     let config = DataConfig {
         split: Split::Share(0.8),
-        mapping: Some(path),
+        mapping: Some(mapping.clone()),
         ..DataConfig::default()
     };
     let dataset = Dataset::load(&folder, &config).unwrap();

@@ -109,6 +109,12 @@ fn the_resolved_config_reads_back_as_itself() {
 }
 
 #[test]
+fn a_default_may_be_written_down() {
+    let written = load(&[("a.toml", "[data]\nunit = 'auto'\nskip_frames = 0")], &[]);
+    assert_eq!(written.unwrap(), load(&[("a.toml", "")], &[]).unwrap());
+}
+
+#[test]
 fn an_unknown_key_is_named_with_its_file() {
     let base = ("b.toml", "[schedule]\nmax_length = 3");
     let text = load(&[("a.toml", "base = 'b.toml'"), base], &[]).unwrap_err();

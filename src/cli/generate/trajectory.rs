@@ -15,7 +15,7 @@ pub struct TrajectoryArgs {
     /// the result; keyframes are moved onto it [default: --motion's, else a smooth curve through
     /// the keyframes]
     #[arg(long, value_name = "FILE.csv")]
-    trajectory: Option<PathBuf>,
+    pub trajectory: Option<PathBuf>,
     /// Root trajectory along a smooth curve through points (cm) "x,z; x,z; ..." or "x,y,z; ...",
     /// from the first frame to the last; without y the root keeps the heights that it would have
     /// had. Keyframes are moved onto it

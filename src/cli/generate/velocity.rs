@@ -8,7 +8,7 @@ use crate::cli::notice::warn;
 use crate::models::generator::Condition;
 use crate::synthesis::SequenceRequest;
 use crate::synthesis::controls::{Gains, read_velocity_factors};
-use crate::synthesis::keyframes::Keyframes;
+use crate::synthesis::keyframes::{FileFrom, Keyframes};
 
 #[derive(Debug, Args)]
 pub struct VelocityArgs {
@@ -19,12 +19,12 @@ pub struct VelocityArgs {
     /// Velocity factors of another clip, from its frame FRAME (0 where left out) on [default:
     /// --motion's, else evenly from keyframe to keyframe]
     #[arg(long, value_name = "FILE.bvh[:FRAME]")]
-    velocity_from: Option<String>,
+    pub velocity_from: Option<FileFrom>,
     /// Velocity factors from a CSV file with the columns
     /// frame,trunk,left_leg,right_leg,right_arm,left_arm (cm/frame), a row for every frame of the
     /// result
     #[arg(long, value_name = "FILE.csv", conflicts_with = "velocity_from")]
-    velocity_csv: Option<PathBuf>,
+    pub velocity_csv: Option<PathBuf>,
 }
 
 impl VelocityArgs {
@@ -50,13 +50,8 @@ impl VelocityArgs {
             request = request.with_velocity_factors(factors)?;
         }
         if let Some(source) = &self.velocity_from {
-            let (path, first) = match source.rsplit_once(':') {
-                Some((path, frame)) if frame.parse::<usize>().is_ok() => {
-                    (PathBuf::from(path), frame.parse()?)
-                }
-                _ => (PathBuf::from(source), 0),
-            };
-            let (factors, notices) = keyframes.velocity_factors(&path, first, frames)?;
+            let (file, first) = (&source.file, source.frame);
+            let (factors, notices) = keyframes.velocity_factors(file, first, frames)?;
             warn(&notices);
             request = request.with_velocity_factors(factors)?;
         }

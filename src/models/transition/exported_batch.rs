@@ -21,7 +21,7 @@ pub struct ExportedBatch {
 /// Why there is no batch.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    #[error("no clip has the {} frames of a window", frames + 1)]
+    #[error("no training clip has the {} frames that --frames {frames} needs", frames + 1)]
     TooShort { frames: usize },
     #[error(transparent)]
     Model(#[from] ModelError),

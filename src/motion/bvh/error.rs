@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::run::FileError;
+
 /// Why a BVH file cannot be read or written.
 #[derive(Debug, Error)]
 pub enum BvhError {
@@ -13,12 +15,8 @@ pub enum BvhError {
         #[source]
         source: std::io::Error,
     },
-    #[error("{path} cannot be written")]
-    Write {
-        path: PathBuf,
-        #[source]
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] FileError),
     /// The text is not BVH; `line` counts from 1.
     #[error("{file}, line {line}: expected {expected}, found {found}")]
     Syntax {

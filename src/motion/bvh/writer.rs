@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::document::Bvh;
 use super::error::BvhError;
+use crate::run::replace_file;
 
 /// Decimals of offsets, positions (cm) and angles (degrees); the step from one to the next is far
 /// below what a recording resolves.
@@ -17,10 +18,7 @@ const DECIMALS: usize = 9;
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, document: &Bvh) -> Result<(), BvhError> {
-    std::fs::write(path, document.to_text()).map_err(|source| BvhError::Write {
-        path: path.into(),
-        source,
-    })
+    Ok(replace_file(path, document.to_text())?)
 }
 
 impl Bvh {

@@ -15,7 +15,7 @@ use std::path::Path;
 use super::ReportError;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{EvaluatedData, EvaluationRecord, TableRow, Tables};
-use crate::run::{FileError, remove_file, replace_file, write_json};
+use crate::run::{RunFolder, check_output_folder, remove_file, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
 const LOSS_CURVE: &str = "loss_curve.svg";
@@ -27,12 +27,31 @@ const INTERPOLATION: &str = "interpolation.json";
 const UNTRAINED: &str = "untrained.json";
 const CHOREOGRAPHY: &str = "choreography.toml";
 
-/// Removes what an earlier demo left beside its run: a demo that is interrupted must not leave
-/// results of two.
+/// Refuses a folder that holds something else than an earlier demo.
 ///
 /// # Errors
-/// A file cannot be removed.
-pub fn remove_results(folder: &Path) -> Result<(), FileError> {
+/// It does.
+pub fn check_folder(folder: &Path) -> Result<(), ReportError> {
+    let problem =
+        if folder.join(CHOREOGRAPHY).exists() || check_output_folder(folder, false).is_ok() {
+            return Ok(());
+        } else if folder.join(RunFolder::CONFIG).exists() {
+            "holds a run already, which is no demo"
+        } else {
+            "holds other files than a demo's"
+        };
+    let folder = folder.display();
+    Err(ReportError::Refused(format!(
+        "{folder} {problem}; give another --out"
+    )))
+}
+
+/// Removes what an earlier demo left beside its run, as a demo that is interrupted must not leave
+/// results of two; and writes what is generated, by which the folder is known as a demo's.
+///
+/// # Errors
+/// A file cannot be removed or written.
+pub fn begin_results(folder: &Path, settings: &DemoSettings) -> Result<(), ReportError> {
     let own = [
         TABLES,
         LOSS_CURVE,
@@ -41,12 +60,13 @@ pub fn remove_results(folder: &Path) -> Result<(), FileError> {
         VIEWER,
         INTERPOLATION,
         UNTRAINED,
-        CHOREOGRAPHY,
     ];
     let scores = EvaluationRecord::files(DataPart::Test);
     own.iter()
         .chain(&scores)
-        .try_for_each(|name| remove_file(&folder.join(name)))
+        .try_for_each(|name| remove_file(&folder.join(name)))?;
+    let choreography = toml::to_string(&settings.choreography)?;
+    Ok(replace_file(&folder.join(CHOREOGRAPHY), choreography)?)
 }
 
 /// Writes the loss curve.
@@ -86,6 +106,5 @@ pub fn write_scores(
         data: EvaluatedData::of(dataset, DataPart::Test)?,
     }
     .write(folder)?;
-    let choreography = toml::to_string(choreography)?;
-    Ok(replace_file(&folder.join(CHOREOGRAPHY), choreography)?)
+    Ok(())
 }

@@ -1,10 +1,10 @@
 //! What the demo generates and trains.
 
-use crate::data::Dataset;
 use crate::data::choreography::{ChoreographyConfig, generate};
+use crate::data::{Dataset, Recording};
 use crate::experiment::ExperimentConfig;
 use crate::models::transition::TransitionSettings;
-use crate::report::ReportError;
+use crate::report::{ReportError, thousands};
 
 const EXPERIMENT: &str = include_str!("../../../experiments/demo.toml");
 
@@ -39,6 +39,20 @@ impl DemoSettings {
             },
             experiment,
         })
+    }
+
+    /// The data in words.
+    pub fn summary(&self, dataset: &Dataset) -> String {
+        let of = |clips: &[Recording]| {
+            let frames: usize = clips.iter().map(Recording::frames).sum();
+            (clips.len(), thousands(frames as u64))
+        };
+        let ((train, frames), (test, test_frames)) = (of(&dataset.train), of(&dataset.test));
+        format!(
+            "{train} clips to train on ({frames} frames), {test} to test on ({test_frames} frames), \
+             generated from seed {}",
+            self.choreography.seed
+        )
     }
 
     /// The generated clips, split as the experiment says.

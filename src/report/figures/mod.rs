@@ -11,7 +11,7 @@ use std::path::Path;
 
 use super::{MotionFigure, ReportError};
 use crate::data::Dataset;
-use crate::run::{Subject, replace_file};
+use crate::run::{FileError, Subject, replace_file};
 
 /// Draws the figures of a paper: a line of [`crate::models::Paper`].
 pub type DrawFigures = fn(&FigureRequest<'_>) -> Result<DrawnFigures, ReportError>;
@@ -39,6 +39,21 @@ pub struct DrawnFigures {
     pub figures: Vec<Figure>,
     /// HTML.
     pub page: Option<String>,
+}
+
+impl DrawnFigures {
+    /// Writes all figures and the page that shows them into a folder, made where there is none.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path, subject: &str) -> Result<(), ReportError> {
+        std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
+        for figure in &self.figures {
+            figure.write(folder)?;
+        }
+        let index = index(&self.figures, subject);
+        Ok(replace_file(&folder.join("index.md"), index)?)
+    }
 }
 
 /// A figure and the numbers behind it.
@@ -73,7 +88,7 @@ impl Figure {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
+    fn write(&self, folder: &Path) -> Result<(), ReportError> {
         let path = |extension: &str| folder.join(self.name).with_extension(extension);
         replace_file(&path("svg"), &self.svg)?;
         replace_file(&path("csv"), &self.numbers.csv()?)?;
@@ -82,7 +97,7 @@ impl Figure {
 }
 
 /// The page that shows all figures with their captions, Markdown.
-pub fn index(figures: &[Figure], subject: &str) -> String {
+fn index(figures: &[Figure], subject: &str) -> String {
     let mut text = format!("# The paper's figures\n\n{subject}\n");
     for Figure { name, caption, .. } in figures {
         let caption = caption.replace('[', "(").replace(']', ")");
