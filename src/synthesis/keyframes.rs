@@ -68,7 +68,7 @@ impl KeyframeChoice {
     }
 }
 
-/// A file, and the frame from which on it is read: "FILE.bvh[:FRAME]", without FRAME the first.
+/// A file, and the frame from which on it is read: `FILE.bvh[:FRAME]`, without FRAME the first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileFrom {
     pub file: PathBuf,
