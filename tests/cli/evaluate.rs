@@ -472,7 +472,7 @@ fn a_cheap_evaluation_says_so_and_leaves_a_runs_scores_alone() {
     let windows = &json(&file)["published"]["windows"];
     assert_eq!((&windows["10"], &windows["50"]), (&3.into(), &3.into()));
     assert!(!run.path().join("evaluation.json").exists());
-    let unknown = cheap(&["--protocol", "mine"]).failure();
+    let unknown = cheap(&["--force", "--protocol", "mine"]).failure();
     unknown.stderr(contains("--protocol mine").and(contains("equations, published")));
 }
 
