@@ -87,7 +87,7 @@ fn steps(config: &Pan2021Config, forcing: Forcing, windows: &[usize]) -> Vec<Ste
         .collect();
     let mut workspace = Workspace::new();
     let mut gradients = [Gradients::zeros(&parameters)];
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
     let steps = batches.iter().enumerate().map(|(step, batch)| {
         let before = LARGE_BYTES.load(Ordering::Relaxed);
         let mut tape = Tape::recording(&parameters, &mut workspace).with_dropout(step as u64);

@@ -76,13 +76,19 @@ const SMALLEST_SCALE: f64 = 1e-3;
 /// of the same sum. It must be deterministic.
 ///
 /// # Errors
-/// What `loss` returns.
+/// Gradients of other parameters; what `loss` returns.
 pub fn check_parameters(
     parameters: &mut Parameters<f64>,
     gradients: &Gradients<f64>,
     per_parameter: usize,
     mut loss: impl FnMut(&Parameters<f64>, &str) -> Result<f64, AutogradError>,
 ) -> Result<CheckReport, AutogradError> {
+    if !gradients.fit(parameters) {
+        return Err(AutogradError::Misplaced {
+            operation: "check_parameters",
+            what: "the gradients are those of other parameters",
+        });
+    }
     let names: Vec<String> = parameters.iter().map(|(name, _)| name.to_owned()).collect();
     let mut reports = Vec::new();
     for (p, (name, gradient)) in names.into_iter().zip(gradients.iter()).enumerate() {
@@ -96,12 +102,10 @@ pub fn check_parameters(
         };
         for index in spread(gradient.len(), per_parameter) {
             let mut at = |offset: f64| -> Result<f64, AutogradError> {
-                let x = number(parameters, p, index);
-                let before = *x;
-                *x += offset;
-                let value = loss(parameters, &name)?;
-                *number(parameters, p, index) = before;
-                Ok(value)
+                let before = set_number(parameters, p, index, |x| x + offset);
+                let value = loss(parameters, &name);
+                set_number(parameters, p, index, |_| before);
+                value
             };
             let Some(found) = compare(gradient[index], scale, centre, &mut at)? else {
                 report.kinks += 1;
@@ -173,12 +177,18 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (sum / values.len().max(1) as f64).sqrt()
 }
 
-fn number(parameters: &mut Parameters<f64>, p: usize, index: usize) -> &mut f64 {
+/// Sets number `index` of parameter `p` to what `change` makes of it. Returns what it was.
+fn set_number(
+    parameters: &mut Parameters<f64>,
+    p: usize,
+    index: usize,
+    change: impl Fn(f64) -> f64,
+) -> f64 {
     let parameter = parameters.values_mut().nth(p);
-    let (_, value) = parameter.expect("a gradient has its parameter");
-    &mut value
-        .as_slice_mut()
-        .expect("a parameter is in standard layout")[index]
+    let (_, mut value) = parameter.expect("a gradient has its parameter");
+    let number = value.iter_mut().nth(index);
+    let number = number.expect("a parameter has as many numbers as its gradient");
+    std::mem::replace(number, change(*number))
 }
 
 #[cfg(test)]

@@ -19,6 +19,20 @@ pub enum AutogradError {
         argument: String,
         expected: &'static str,
     },
+    /// A number that is given beside the operands is out of its range.
+    #[error("{operation}: {name} = {value}: expected {expected}")]
+    Number {
+        operation: &'static str,
+        name: &'static str,
+        value: f64,
+        expected: &'static str,
+    },
+    /// What is given belongs elsewhere, or the tape cannot do it.
+    #[error("{operation}: {what}")]
+    Misplaced {
+        operation: &'static str,
+        what: &'static str,
+    },
     /// The first operation whose result holds a NaN or an infinity.
     #[error(
         "{operation} (operation {index} of the step) made a {what} in its {place} of shape {shape:?} from inputs of shapes {inputs:?}"
@@ -33,4 +47,24 @@ pub enum AutogradError {
         shape: Vec<usize>,
         inputs: Vec<Vec<usize>>,
     },
+}
+
+impl AutogradError {
+    /// An error about the number `name` of an operation unless it is `valid`.
+    pub(crate) fn unless(
+        valid: bool,
+        operation: &'static str,
+        (name, value): (&'static str, f64),
+        expected: &'static str,
+    ) -> Result<(), Self> {
+        match valid {
+            true => Ok(()),
+            false => Err(Self::Number {
+                operation,
+                name,
+                value,
+                expected,
+            }),
+        }
+    }
 }

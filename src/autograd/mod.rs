@@ -8,6 +8,8 @@
 
 pub mod check;
 mod error;
+// Public for tests and benchmarks alone: it panics where shapes do not fit.
+#[doc(hidden)]
 pub mod kernels;
 pub mod ops;
 mod parameters;
@@ -19,5 +21,6 @@ mod workspace;
 pub use error::AutogradError;
 pub use kernels::Real;
 pub use parameters::{BlockId, BufferId, Gradients, ParameterId, Parameters};
-pub use tape::{Backward, Operation, Tape, Target, Var};
+pub(crate) use tape::{Backward, Operation, Target};
+pub use tape::{Tape, Var};
 pub use workspace::Workspace;

@@ -2,23 +2,34 @@
 
 use std::ops::Range;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use ndarray::ArrayD;
+use ndarray::{ArrayD, ArrayViewMutD};
 
+use super::error::AutogradError;
 use super::kernels::{Mat, Packed, Real};
 
-/// A parameter of a [`Parameters`].
+/// A parameter of a [`Parameters`] and of its clones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct ParameterId(pub(super) usize);
+pub struct ParameterId {
+    index: usize,
+    owner: u32,
+}
 
 /// A range of rows of a parameter (all of them, or a part such as the keys' rows of
 /// `in_proj_weight`): what a tape sees of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct BlockId(pub(super) usize);
+pub struct BlockId {
+    pub(super) index: usize,
+    owner: u32,
+}
 
-/// A buffer of a [`Parameters`].
+/// A buffer of a [`Parameters`] and of its clones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct BufferId(usize);
+pub struct BufferId {
+    index: usize,
+    owner: u32,
+}
 
 #[derive(Debug, Clone)]
 struct Parameter<T> {
@@ -40,16 +51,26 @@ struct Block<T> {
 
 /// Named weights, and named buffers: state that is saved with them and that no gradient moves, such
 /// as running means. Shared read-only by the tapes of a step; changed between steps only.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Parameters<T> {
+    /// What their ids have, too, and those of no others but clones.
+    owner: u32,
     parameters: Vec<Parameter<T>>,
     blocks: Vec<Block<T>>,
     buffers: Vec<Parameter<T>>,
 }
 
+impl<T: Real> Default for Parameters<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<T: Real> Parameters<T> {
     pub fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
         Self {
+            owner: NEXT.fetch_add(1, Ordering::Relaxed),
             parameters: Vec::new(),
             blocks: Vec::new(),
             buffers: Vec::new(),
@@ -62,17 +83,30 @@ impl<T: Real> Parameters<T> {
             name: name.into(),
             value: value.as_standard_layout().into_owned(),
         });
-        BufferId(self.buffers.len() - 1)
+        BufferId {
+            index: self.buffers.len() - 1,
+            owner: self.owner,
+        }
     }
 
     /// The values of a buffer.
-    pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
-        &self.buffers[id.0].value
+    ///
+    /// # Errors
+    /// A buffer of other parameters.
+    pub fn buffer(&self, id: BufferId) -> Result<&ArrayD<T>, AutogradError> {
+        let buffer = self.buffers.get(id.index);
+        let own = buffer.filter(|_| id.owner == self.owner);
+        Ok(&own.ok_or(foreign("buffer"))?.value)
     }
 
     /// The values of a buffer, to be changed.
-    pub fn buffer_mut(&mut self, id: BufferId) -> &mut ArrayD<T> {
-        &mut self.buffers[id.0].value
+    ///
+    /// # Errors
+    /// A buffer of other parameters.
+    pub fn buffer_mut(&mut self, id: BufferId) -> Result<ArrayViewMutD<'_, T>, AutogradError> {
+        let buffer = self.buffers.get_mut(id.index);
+        let own = buffer.filter(|_| id.owner == self.owner);
+        Ok(own.ok_or(foreign("buffer_mut"))?.value.view_mut())
     }
 
     /// Names and values of the buffers, in the order in which they were added.
@@ -83,10 +117,10 @@ impl<T: Real> Parameters<T> {
     }
 
     /// All that a weights file holds, to be changed: parameters, then buffers.
-    pub fn saved_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
+    pub fn saved_mut(&mut self) -> impl Iterator<Item = (&str, ArrayViewMutD<'_, T>)> {
         self.forget_packed();
         let saved = self.parameters.iter_mut().chain(&mut self.buffers);
-        saved.map(|saved| (saved.name.as_str(), &mut saved.value))
+        saved.map(|saved| (saved.name.as_str(), saved.value.view_mut()))
     }
 
     /// All that a weights file holds: parameters, then buffers.
@@ -96,7 +130,10 @@ impl<T: Real> Parameters<T> {
 
     /// Adds a parameter and the block that covers it whole.
     pub fn add(&mut self, name: impl Into<String>, value: ArrayD<T>) -> (ParameterId, BlockId) {
-        let id = ParameterId(self.parameters.len());
+        let id = ParameterId {
+            index: self.parameters.len(),
+            owner: self.owner,
+        };
         let value = value.as_standard_layout().into_owned();
         let (len, shape) = (value.len(), value.shape().to_vec());
         self.parameters.push(Parameter {
@@ -107,8 +144,13 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The block of a parameter's rows in `rows` (clamped to the rows there are).
-    pub fn rows(&mut self, id: ParameterId, rows: Range<usize>) -> BlockId {
-        let value = &self.parameters[id.0].value;
+    ///
+    /// # Errors
+    /// A parameter of other parameters.
+    pub fn rows(&mut self, id: ParameterId, rows: Range<usize>) -> Result<BlockId, AutogradError> {
+        let parameter = self.parameters.get(id.index);
+        let own = parameter.filter(|_| id.owner == self.owner);
+        let value = &own.ok_or(foreign("rows"))?.value;
         let mut shape = value.shape().to_vec();
         let total = shape.first().copied().unwrap_or(1);
         let (start, end) = (rows.start.min(total), rows.end.min(total));
@@ -116,18 +158,29 @@ impl<T: Real> Parameters<T> {
         if let Some(first) = shape.first_mut() {
             *first = end.saturating_sub(start);
         }
-        self.add_block(id, start * width..end.max(start) * width, shape)
+        Ok(self.add_block(id, start * width..end.max(start) * width, shape))
     }
 
     fn add_block(&mut self, id: ParameterId, range: Range<usize>, shape: Vec<usize>) -> BlockId {
         self.blocks.push(Block {
-            parameter: id.0,
+            parameter: id.index,
             range,
             shape,
             packed: OnceLock::new(),
             packed_transposed: OnceLock::new(),
         });
-        BlockId(self.blocks.len() - 1)
+        BlockId {
+            index: self.blocks.len() - 1,
+            owner: self.owner,
+        }
+    }
+
+    /// Refuses a block of other parameters.
+    pub(super) fn check_block(&self, id: BlockId) -> Result<(), AutogradError> {
+        match id.owner == self.owner && id.index < self.blocks.len() {
+            true => Ok(()),
+            false => Err(foreign("block")),
+        }
     }
 
     /// Number of parameters (arrays).
@@ -156,11 +209,11 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The values one after another, to be changed; what was packed of them is forgotten.
-    pub fn values_mut(&mut self) -> impl Iterator<Item = (&str, &mut ArrayD<T>)> {
+    pub fn values_mut(&mut self) -> impl Iterator<Item = (&str, ArrayViewMutD<'_, T>)> {
         self.forget_packed();
         self.parameters
             .iter_mut()
-            .map(|parameter| (parameter.name.as_str(), &mut parameter.value))
+            .map(|parameter| (parameter.name.as_str(), parameter.value.view_mut()))
     }
 
     fn forget_packed(&mut self) {
@@ -171,11 +224,11 @@ impl<T: Real> Parameters<T> {
     }
 
     pub(super) fn block_shape(&self, id: BlockId) -> &[usize] {
-        &self.blocks[id.0].shape
+        &self.blocks[id.index].shape
     }
 
     pub(super) fn block_values(&self, id: BlockId) -> &[T] {
-        let block = &self.blocks[id.0];
+        let block = &self.blocks[id.index];
         let values = self.parameters[block.parameter]
             .value
             .as_slice()
@@ -184,7 +237,7 @@ impl<T: Real> Parameters<T> {
     }
 
     fn block_matrix(&self, id: BlockId) -> Mat<'_, T> {
-        let shape = &self.blocks[id.0].shape;
+        let shape = &self.blocks[id.index].shape;
         let rows = shape.first().copied().unwrap_or(1);
         let columns = shape.iter().skip(1).product();
         Mat::new(self.block_values(id), rows, columns)
@@ -192,17 +245,22 @@ impl<T: Real> Parameters<T> {
 
     /// The block W [out, in], packed as the right operand of `d y W`.
     pub(super) fn packed(&self, id: BlockId) -> &Packed<T> {
-        self.blocks[id.0]
+        self.blocks[id.index]
             .packed
             .get_or_init(|| Packed::new(self.block_matrix(id)))
     }
 
     /// The transpose of the block W [out, in], packed as the right operand of `x W^T`.
     pub(super) fn packed_transposed(&self, id: BlockId) -> &Packed<T> {
-        self.blocks[id.0]
+        self.blocks[id.index]
             .packed_transposed
             .get_or_init(|| Packed::transposed(self.block_matrix(id)))
     }
+}
+
+fn foreign(operation: &'static str) -> AutogradError {
+    let what = "what is asked for belongs to other parameters";
+    AutogradError::Misplaced { operation, what }
 }
 
 /// Gradients of all parameters, in their order, each in the layout of its parameter.
@@ -235,13 +293,19 @@ impl<T: Real> Gradients<T> {
         self.values.iter_mut().map(Vec::as_mut_slice)
     }
 
+    /// Whether there is a number for each weight of `parameters`.
+    pub fn fit(&self, parameters: &Parameters<T>) -> bool {
+        let lengths = parameters.iter().map(|(_, value)| value.len());
+        lengths.eq(self.values.iter().map(Vec::len))
+    }
+
     pub(super) fn block(&self, parameters: &Parameters<T>, id: BlockId) -> &[T] {
-        let block = &parameters.blocks[id.0];
+        let block = &parameters.blocks[id.index];
         &self.values[block.parameter][block.range.clone()]
     }
 
     pub(super) fn block_mut(&mut self, parameters: &Parameters<T>, id: BlockId) -> &mut [T] {
-        let block = &parameters.blocks[id.0];
+        let block = &parameters.blocks[id.index];
         &mut self.values[block.parameter][block.range.clone()]
     }
 }

@@ -1,5 +1,7 @@
 //! The tape: values in the order in which they were made.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::error::AutogradError;
@@ -14,14 +16,23 @@ mod known;
 pub use backward::{Backward, Target};
 use known::Known;
 
-/// A value on a tape.
+/// A value on a tape; every other tape refuses it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Var(u32);
+pub struct Var {
+    index: u32,
+    stamp: u32,
+}
 
 impl Var {
     fn index(self) -> usize {
-        self.0 as usize
+        self.index as usize
     }
+}
+
+/// A number that no value has yet: a tape has one of its own, and another once it forgot values.
+fn new_stamp() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// What a recorded operation knows for its way back.
@@ -47,10 +58,22 @@ const INPUT: &str = "input";
 
 struct Node<T> {
     name: &'static str,
+    /// That of the [`Var`]s which name it.
+    stamp: u32,
     value: Value<T>,
     inputs: Vec<Var>,
     needs_gradient: bool,
     operation: Option<Box<dyn Operation<T>>>,
+}
+
+impl<T: Real> Node<T> {
+    fn shape<'s>(&'s self, parameters: &'s Parameters<T>) -> &'s [usize] {
+        match &self.value {
+            Value::Array(array) => array.shape(),
+            Value::Block(id) => parameters.block_shape(*id),
+            Value::Released => &[],
+        }
+    }
 }
 
 /// The lists of a tape, which outlive it empty in its workspace.
@@ -69,6 +92,8 @@ pub struct Tape<'a, T: Real> {
     workspace: &'a mut Workspace<T>,
     nodes: Vec<Node<T>>,
     leaves: Vec<Option<Var>>,
+    /// That of the values to come.
+    stamp: u32,
     recording: bool,
     frozen: bool,
     dropout_key: Option<u64>,
@@ -87,6 +112,7 @@ impl<'a, T: Real> Tape<'a, T> {
             parameters,
             workspace,
             nodes,
+            stamp: new_stamp(),
             recording: true,
             frozen: false,
             dropout_key: None,
@@ -124,9 +150,24 @@ impl<'a, T: Real> Tape<'a, T> {
         self.recording
     }
 
+    /// A key for the draws of the next operation beside the probability `p` of its dropout, where
+    /// dropout is on and that above 0.
+    ///
+    /// # Errors
+    /// A probability that is none.
+    pub(super) fn next_draws(
+        &self,
+        operation: &'static str,
+        p: f64,
+    ) -> Result<Option<(u64, f64)>, AutogradError> {
+        let (valid, expected) = ((0.0..=1.0).contains(&p), "a probability, from 0 to 1");
+        AutogradError::unless(valid, operation, ("p", p), expected)?;
+        Ok(self.next_key(p))
+    }
+
     /// A key for the draws of the next operation beside their `strength`, where dropout is on and
     /// that above 0.
-    pub(super) fn next_draws(&self, strength: f64) -> Option<(u64, f64)> {
+    pub(super) fn next_key(&self, strength: f64) -> Option<(u64, f64)> {
         let key = self.dropout_key.filter(|_| strength > 0.0);
         key.map(|key| {
             let mut x = key ^ (self.nodes.len() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -142,18 +183,27 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     /// A constant of the given shape in a reused buffer that `fill` writes, all of it.
-    pub fn constant_with(&mut self, shape: &[usize], fill: impl FnOnce(&mut [T])) -> Var {
-        let mut buffer = self.workspace.take(shape.iter().product());
+    ///
+    /// # Errors
+    /// A shape of more numbers than memory has addresses.
+    pub fn constant_with(
+        &mut self,
+        shape: &[usize],
+        fill: impl FnOnce(&mut [T]),
+    ) -> Result<Var, AutogradError> {
+        let mut buffer = self.take_for("constant", shape)?;
         fill(&mut buffer);
-        self.push("constant", &[], shape, buffer, false, None)
+        Ok(self.push("constant", &[], shape, buffer, false, None))
     }
 
     /// The numbers of `x` as a constant: no gradient goes back through it.
-    pub fn detach(&mut self, x: Var) -> Var {
-        let shape = self.shape(x).to_vec();
-        let mut buffer = self.workspace.take(self.values(x).len());
-        buffer.copy_from_slice(self.values(x));
-        self.push("detach", &[x], &shape, buffer, false, None)
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn detach(&mut self, x: Var) -> Result<Var, AutogradError> {
+        self.own("detach", &[x])?;
+        let (shape, buffer) = self.copy(x);
+        Ok(self.push("detach", &[x], &shape, buffer, false, None))
     }
 
     /// A value that is given and wants a gradient of its own, see [`Tape::backward_from`].
@@ -181,35 +231,63 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// A block of a parameter, the same value however often it is asked for; inside
     /// [`Tape::frozen`] a constant.
-    pub fn block(&mut self, id: BlockId) -> Var {
-        if let Some(var) = self.leaves[id.0].filter(|_| !self.frozen) {
-            return var;
+    ///
+    /// # Errors
+    /// A block of other parameters than the tape's.
+    pub fn block(&mut self, id: BlockId) -> Result<Var, AutogradError> {
+        self.parameters.check_block(id)?;
+        if let Some(var) = self.leaves[id.index].filter(|_| !self.frozen) {
+            return Ok(var);
         }
         let needs_gradient = !self.frozen;
         let var = self.node("parameter", Value::Block(id), &[], needs_gradient, None);
         if !self.frozen {
-            self.leaves[id.0] = Some(var);
+            self.leaves[id.index] = Some(var);
         }
-        var
+        Ok(var)
     }
 
-    pub fn shape(&self, var: Var) -> &[usize] {
-        self.known().shape(var)
+    /// # Errors
+    /// A value of another tape.
+    pub fn shape(&self, var: Var) -> Result<&[usize], AutogradError> {
+        self.own("shape", &[var])?;
+        Ok(self.known().shape(var))
     }
 
     /// The numbers of a value in row-major order.
-    pub fn values(&self, var: Var) -> &[T] {
-        self.known().values(var)
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn values(&self, var: Var) -> Result<&[T], AutogradError> {
+        self.own("values", &[var])?;
+        Ok(self.known().values(var))
     }
 
     /// A value as an array.
-    pub fn array(&self, var: Var) -> ArrayViewD<'_, T> {
-        self.known().array(var)
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn array(&self, var: Var) -> Result<ArrayViewD<'_, T>, AutogradError> {
+        self.own("array", &[var])?;
+        Ok(self.known().array(var))
+    }
+
+    /// Refuses operands that are not on this tape: each operation begins with it.
+    pub(super) fn own(&self, operation: &'static str, vars: &[Var]) -> Result<(), AutogradError> {
+        let here = |var: &Var| {
+            let node = self.nodes.get(var.index());
+            node.is_some_and(|node| node.stamp == var.stamp)
+        };
+        if vars.iter().all(here) {
+            return Ok(());
+        }
+        let what = "a value is not on this tape: it was made on another one, or is forgotten";
+        Err(AutogradError::Misplaced { operation, what })
     }
 
     /// Rows and columns of a value seen as a matrix: the last axis, and all before it.
     pub(super) fn rows_and_columns(&self, var: Var) -> (usize, usize) {
-        let shape = self.shape(var);
+        let shape = self.known().shape(var);
         let columns = shape.last().copied().unwrap_or(1);
         (shape.iter().rev().skip(1).product(), columns)
     }
@@ -221,6 +299,34 @@ impl<'a, T: Real> Tape<'a, T> {
     /// A buffer for an operation's output or for what it saves, content undefined.
     pub(super) fn take(&mut self, len: usize) -> Vec<T> {
         self.workspace.take(len)
+    }
+
+    /// The same for an output of this shape, which may be larger than its operands together.
+    pub(super) fn take_for(
+        &mut self,
+        operation: &'static str,
+        shape: &[usize],
+    ) -> Result<Vec<T>, AutogradError> {
+        // Axes of 0 count as 1, as they do for ndarray.
+        let numbers = shape.iter().filter(|&&n| n > 0);
+        let bytes = numbers.fold(size_of::<T>(), |bytes, &n| bytes.saturating_mul(n));
+        let buffer = match bytes <= isize::MAX as usize {
+            true => self.workspace.try_take(shape.iter().product()),
+            false => None,
+        };
+        buffer.ok_or_else(|| AutogradError::Argument {
+            operation,
+            shape: shape.to_vec(),
+            argument: "the memory".into(),
+            expected: "fewer numbers",
+        })
+    }
+
+    /// Shape and numbers of a value, in a buffer of their own.
+    pub(super) fn copy(&mut self, var: Var) -> (Vec<usize>, Vec<T>) {
+        let mut buffer = self.take(self.known().values(var).len());
+        buffer.copy_from_slice(self.known().values(var));
+        (self.known().shape(var).to_vec(), buffer)
     }
 
     pub(super) fn give(&mut self, buffer: Vec<T>) {
@@ -244,7 +350,9 @@ impl<'a, T: Real> Tape<'a, T> {
         output: Vec<T>,
         operation: impl FnOnce() -> O,
     ) -> Var {
-        let needs_gradient = self.recording && inputs.iter().any(|&v| self.needs_gradient(v));
+        // An output without numbers sends no gradient back.
+        let needs_gradient =
+            self.recording && !output.is_empty() && inputs.iter().any(|&v| self.needs_gradient(v));
         let operation = needs_gradient.then(|| -> Box<dyn Operation<T>> { Box::new(operation()) });
         self.push(name, inputs, shape, output, needs_gradient, operation)
     }
@@ -274,14 +382,16 @@ impl<'a, T: Real> Tape<'a, T> {
         operation: Option<Box<dyn Operation<T>>>,
     ) -> Var {
         let inputs = if self.recording { inputs } else { &[] };
+        let (index, stamp) = (self.nodes.len() as u32, self.stamp);
         self.nodes.push(Node {
             name,
+            stamp,
             value,
             inputs: inputs.to_vec(),
             needs_gradient: needs_gradient && self.recording,
             operation,
         });
-        Var(self.nodes.len() as u32 - 1)
+        Var { index, stamp }
     }
 
     /// A place on the tape, see [`Tape::forget_since`].
@@ -291,24 +401,45 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// Without recording: drops every value made since `mark` but those in `keep`, which are
     /// renamed in place. So a long generation needs the memory of one frame.
-    pub fn forget_since(&mut self, mark: usize, keep: &mut [&mut Var]) {
-        if self.recording {
-            return;
+    ///
+    /// # Errors
+    /// A value to keep that is of another tape; then none is dropped.
+    pub fn forget_since(
+        &mut self,
+        mark: usize,
+        keep: &mut [&mut Var],
+    ) -> Result<(), AutogradError> {
+        for var in keep.iter() {
+            self.own("forget_since", &[**var])?;
         }
-        let mut order: Vec<usize> = (0..keep.len())
-            .filter(|&k| keep[k].index() >= mark)
-            .collect();
-        order.sort_by_key(|&k| keep[k].index());
+        if self.recording {
+            return Ok(());
+        }
+        self.stamp = new_stamp();
         let mut renamed: Vec<(Var, Var)> = Vec::new();
+        let mark = mark.min(self.nodes.len());
         let mut end = mark;
         for index in mark..self.nodes.len() {
-            let wanted = order.iter().any(|&k| keep[k].index() == index);
+            let wanted = keep.iter().any(|var| var.index() == index);
             if wanted || matches!(self.nodes[index].value, Value::Block(_)) {
                 self.nodes.swap(end, index);
-                if let Value::Block(id) = self.nodes[end].value {
-                    self.leaves[id.0] = Some(Var(end as u32));
+                let (node, place) = (&mut self.nodes[end], end as u32);
+                let old = Var {
+                    index: index as u32,
+                    stamp: node.stamp,
+                };
+                // Where it moved, what stood there before it was named likewise.
+                if end != index {
+                    node.stamp = self.stamp;
                 }
-                renamed.push((Var(index as u32), Var(end as u32)));
+                let new = Var {
+                    index: place,
+                    stamp: node.stamp,
+                };
+                if let Value::Block(id) = node.value {
+                    self.leaves[id.index] = Some(new);
+                }
+                renamed.push((old, new));
                 end += 1;
             }
         }
@@ -320,6 +451,7 @@ impl<'a, T: Real> Tape<'a, T> {
                 **var = *new;
             }
         }
+        Ok(())
     }
 
     /// The first value on the tape that is not finite, as an error that names its operation.
@@ -341,18 +473,21 @@ impl<'a, T: Real> Tape<'a, T> {
             index,
             what,
             place,
-            shape: self.shape(Var(index as u32)).to_vec(),
+            shape: node.shape(self.parameters).to_vec(),
             inputs: node
                 .inputs
                 .iter()
-                .map(|&v| self.shape(v).to_vec())
+                .map(|&v| self.known().shape(v).to_vec())
                 .collect(),
         }
     }
 
     /// The values of a buffer, such as a running mean; on the tape they are a constant like any
     /// other.
-    pub fn buffer(&self, id: BufferId) -> &ArrayD<T> {
+    ///
+    /// # Errors
+    /// A buffer of other parameters than the tape's.
+    pub fn buffer(&self, id: BufferId) -> Result<&ArrayD<T>, AutogradError> {
         self.parameters.buffer(id)
     }
 }

@@ -43,12 +43,26 @@ impl<T: Real> Workspace<T> {
     /// A buffer of `len` numbers, whose content is whatever an earlier step left there.
     pub fn take(&mut self, len: usize) -> Vec<T> {
         let class = class(len);
-        let mut fitting = self.free.range_mut(class..=2 * class);
-        let mut buffer = fitting
-            .find_map(|(_, buffers)| buffers.pop())
+        let mut buffer = self
+            .free(class)
             .unwrap_or_else(|| Vec::with_capacity(class));
         buffer.resize(len, T::zero());
         buffer
+    }
+
+    /// The same; none where memory does not hold it.
+    pub(super) fn try_take(&mut self, len: usize) -> Option<Vec<T>> {
+        let class = class(len);
+        let mut buffer = self.free(class).unwrap_or_default();
+        buffer.try_reserve_exact(class).ok()?;
+        buffer.resize(len, T::zero());
+        Some(buffer)
+    }
+
+    /// A free buffer of at least this class.
+    fn free(&mut self, class: usize) -> Option<Vec<T>> {
+        let mut fitting = self.free.range_mut(class..=2 * class);
+        fitting.find_map(|(_, buffers)| buffers.pop())
     }
 
     /// Gives a buffer back. One that did not come from here is kept only if its capacity is that of

@@ -180,29 +180,11 @@ impl ExperimentConfig {
                 )?;
             }
         }
-        let adam = &self.optimiser;
-        let positive = |key: &str, x: f64| {
-            ValueError::unless(x > 0.0 && x.is_finite(), key, x, "a number above 0")
-        };
-        let beta = |key: &str, x: f64| {
-            ValueError::unless((0.0..1.0).contains(&x), key, x, "at least 0 and below 1")
-        };
-        positive("optimiser.learning_rate", adam.learning_rate)?;
-        for (group, &rate) in &adam.rates {
-            positive(&format!("optimiser.rates.{group}"), rate)?;
-        }
-        beta("optimiser.beta1", adam.beta1)?;
-        beta("optimiser.beta2", adam.beta2)?;
-        positive("optimiser.epsilon", adam.epsilon)?;
-        if let Some(norm) = adam.clip_norm {
-            positive("optimiser.clip_norm", norm)?;
-        }
-        let share = adam
-            .rate_schedule
-            .map_or(0.0, |schedule| schedule.final_share);
-        let key = "optimiser.rate_schedule.final_share";
-        let valid = (0.0..=1.0).contains(&share);
-        ValueError::unless(valid, key, share, "at least 0 and at most 1")
+        self.optimiser.check().map_err(|setting| ValueError {
+            key: format!("optimiser.{}", setting.key),
+            value: setting.value.to_string(),
+            expected: setting.expected.into(),
+        })
     }
 }
 

@@ -211,7 +211,7 @@ impl SavedWeights {
                 value.shape()
             )));
         }
-        for (name, value) in parameters.saved_mut() {
+        for (name, mut value) in parameters.saved_mut() {
             if let Some(saved) = self.arrays.get(name) {
                 value.assign(saved);
             }

@@ -44,12 +44,23 @@ pub struct NarrowAttention {
 
 impl MultiHeadAttention {
     /// Adds `{name}.in_proj_weight`, `.in_proj_bias`, `.out_proj.weight`, `.out_proj.bias`.
+    ///
+    /// # Errors
+    /// Heads that do not divide the width.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: TransformerSizes,
-    ) -> Self {
+    ) -> Result<Self, AutogradError> {
         let d = sizes.width;
+        if d == 0 || !d.is_multiple_of(sizes.heads) {
+            return Err(AutogradError::Argument {
+                operation: "attention",
+                shape: vec![d],
+                argument: format!("{} heads", sizes.heads),
+                expected: "a number that divides the width",
+            });
+        }
         let head = d / sizes.heads;
         // Xavier uniform for [3d, d].
         let bound = (6.0 / (4 * d) as f64).sqrt();
@@ -64,27 +75,27 @@ impl MultiHeadAttention {
         let heads = |init: &mut Initialiser<'_, T, R>, start: usize| {
             (0..sizes.heads)
                 .map(|h| init.rows(weight, start + h * head..start + (h + 1) * head))
-                .collect()
+                .collect::<Result<_, _>>()
         };
-        Self {
+        Ok(Self {
             in_projection: Linear {
                 weight: whole,
                 bias: whole_bias,
             },
             queries: Linear {
-                weight: init.rows(weight, 0..d),
-                bias: init.rows(bias, 0..d),
+                weight: init.rows(weight, 0..d)?,
+                bias: init.rows(bias, 0..d)?,
             },
             keys_and_values: Linear {
-                weight: init.rows(weight, d..3 * d),
-                bias: init.rows(bias, d..3 * d),
+                weight: init.rows(weight, d..3 * d)?,
+                bias: init.rows(bias, d..3 * d)?,
             },
-            head_keys: heads(init, d),
-            head_values: heads(init, 2 * d),
-            value_bias: init.rows(bias, 2 * d..3 * d),
+            head_keys: heads(init, d)?,
+            head_values: heads(init, 2 * d)?,
+            value_bias: init.rows(bias, 2 * d..3 * d)?,
             output,
             sizes,
-        }
+        })
     }
 
     fn shape(&self, queries: usize, keys: usize) -> AttentionShape {
@@ -123,7 +134,7 @@ impl MultiHeadAttention {
     /// the projections' bias goes there.
     ///
     /// # Errors
-    /// A basis of another width.
+    /// A basis of another width, or without the numbers at `ones`.
     pub fn narrow<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -133,18 +144,27 @@ impl MultiHeadAttention {
         let TransformerSizes {
             width: d, heads, ..
         } = self.sizes;
-        let k = tape.shape(basis).first().copied().unwrap_or(0);
-        let weight = tape.block(self.in_projection.weight);
+        let shape = tape.shape(basis)?;
+        let k = shape.first().copied().unwrap_or(0);
+        if ones.start > ones.end || ones.end > k {
+            return Err(AutogradError::Argument {
+                operation: "attention",
+                shape: shape.to_vec(),
+                argument: format!("ones at {ones:?}"),
+                expected: "a range of its rows",
+            });
+        }
+        let weight = tape.block(self.in_projection.weight)?;
         let projected = tape.linear(basis, weight, None, false)?;
         let mask = tape.constant_with(&[k, 1], |out| {
             out.fill(T::zero());
             out[ones].fill(T::one());
-        });
-        let bias = tape.block(self.in_projection.bias);
+        })?;
+        let bias = tape.block(self.in_projection.bias)?;
         let bias = tape.reshape(bias, &[1, 3 * d])?;
         let bias = tape.mul(bias, mask)?;
         let projected = tape.add(projected, bias)?;
-        let output = tape.block(self.output.weight);
+        let output = tape.block(self.output.weight)?;
         let (mut forms, mut outputs) = (Vec::new(), Vec::new());
         for h in 0..heads {
             let columns = |part: usize| {
@@ -184,7 +204,7 @@ impl MultiHeadAttention {
         let scale = 1.0 / ((width / heads) as f64).sqrt();
         let queries = tape.linear(numbers, narrow.forms, None, false)?;
         let y = tape.shared_attention(queries, numbers, tokens, scale, dropout)?;
-        let bias = tape.block(self.output.bias);
+        let bias = tape.block(self.output.bias)?;
         tape.linear(y, narrow.outputs, Some(bias), false)
     }
 
@@ -237,11 +257,13 @@ impl MultiHeadAttention {
         count: usize,
     ) -> Result<Var, AutogradError> {
         let q = self.queries.forward(tape, x)?;
-        let mut blocks = |ids: &[BlockId]| ids.iter().map(|&id| tape.block(id)).collect();
+        let mut blocks = |ids: &[BlockId]| -> Result<Vec<Var>, AutogradError> {
+            ids.iter().map(|&id| tape.block(id)).collect()
+        };
         let weights = QueryAttentionWeights {
-            keys: blocks(&self.head_keys),
-            values: blocks(&self.head_values),
-            value_bias: tape.block(self.value_bias),
+            keys: blocks(&self.head_keys)?,
+            values: blocks(&self.head_values)?,
+            value_bias: tape.block(self.value_bias)?,
         };
         let y = tape.query_attention(q, tokens, weights, count, self.sizes.dropout)?;
         self.output.forward(tape, y)

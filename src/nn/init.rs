@@ -1,9 +1,11 @@
 //! Initial values of weights, drawn as PyTorch draws them by default.
 
+use std::ops::Range;
+
 use ndarray::{ArrayD, IxDyn};
 use rand::{Rng, RngExt};
 
-use crate::autograd::{BlockId, BufferId, ParameterId, Parameters, Real};
+use crate::autograd::{AutogradError, BlockId, BufferId, ParameterId, Parameters, Real};
 
 /// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and
 /// memory would end first.
@@ -49,9 +51,11 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
         }
     }
 
-    /// Uniform between `-bound` and `bound`.
+    /// Uniform between `-bound` and `bound`; 0 where that has no end, as for a layer without
+    /// inputs.
     pub fn uniform(&mut self, name: String, shape: &[usize], bound: f64) -> (ParameterId, BlockId) {
         let shape = self.admit(shape);
+        let bound = if bound.is_finite() { bound } else { 0.0 };
         let rng = &mut self.rng;
         let value = ArrayD::from_shape_simple_fn(shape, || {
             T::from_f64((2.0 * rng.random::<f64>() - 1.0) * bound)
@@ -76,7 +80,10 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
     }
 
     /// A block of a parameter's rows.
-    pub fn rows(&mut self, id: ParameterId, rows: std::ops::Range<usize>) -> BlockId {
+    ///
+    /// # Errors
+    /// A parameter of other parameters.
+    pub fn rows(&mut self, id: ParameterId, rows: Range<usize>) -> Result<BlockId, AutogradError> {
         self.parameters.rows(id, rows)
     }
 }

@@ -43,6 +43,15 @@ pub fn fastest<E>(
     Ok(seconds)
 }
 
+/// Why layers cannot be timed.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    #[error(transparent)]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    #[error(transparent)]
+    Layers(#[from] AutogradError),
+}
+
 enum Layers {
     Lstm { lstm: Lstm, head: Linear },
     Encoder(Box<[TransformerEncoderLayer; 2]>),
@@ -68,7 +77,7 @@ impl MeasuredLayers {
     ///
     /// # Errors
     /// No pool of so many threads to be had.
-    pub fn new(measured: Measured, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(measured: Measured, threads: usize) -> Result<Self, MeasureError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()?;
@@ -88,8 +97,8 @@ impl MeasuredLayers {
                     feed_forward: 256,
                     dropout: 0.1,
                 };
-                let layers =
-                    ["0", "1"].map(|name| TransformerEncoderLayer::new(&mut init, name, sizes));
+                let mut layer = |name| TransformerEncoderLayer::new(&mut init, name, sizes);
+                let layers = [layer("0")?, layer("1")?];
                 (Layers::Encoder(Box::new(layers)), |count| {
                     [count * TOKENS, 256]
                 })
@@ -135,8 +144,8 @@ impl MeasuredLayers {
                 let tape = Tape::recording(parameters, &mut shard.workspace);
                 let mut tape = tape.with_dropout(1);
                 let y = layers.forward(&mut tape, &shard.input)?;
-                let squares = tape.square(y);
-                let loss = tape.sum(squares);
+                let squares = tape.square(y)?;
+                let loss = tape.sum(squares)?;
                 tape.backward(loss, &mut shard.gradients)
             })
         })?;
@@ -157,7 +166,7 @@ impl Layers {
             Self::Lstm { lstm, head } => {
                 let x = tape.constant(input.clone());
                 let count = input.shape()[0] / FRAMES;
-                let mut state = lstm.start(tape, count);
+                let mut state = lstm.start(tape, count)?;
                 let mut outputs = Vec::new();
                 for t in 0..FRAMES {
                     let x = tape.rows(x, t * count..(t + 1) * count)?;

@@ -55,7 +55,7 @@ impl Mlp {
         Self::with_activation(init, name, sizes, Activation::Prelu, last)
     }
 
-    /// Layers from `sizes[0]` to `sizes[1]` to ..
+    /// Layers from `sizes[0]` to `sizes[1]` to ..: at least two sizes.
     pub fn with_activation<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
@@ -92,12 +92,16 @@ impl Mlp {
     /// `[.., sizes[0]]` -> `[.., last size]`.
     ///
     /// # Errors
-    /// An input of another width.
+    /// An input of another width; no layer.
     pub fn forward<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         mut x: Var,
     ) -> Result<Var, AutogradError> {
+        if self.layers.is_empty() {
+            let (operation, what) = ("mlp", "it has fewer than two sizes, so no layer");
+            return Err(AutogradError::Misplaced { operation, what });
+        }
         for (linear, step) in &self.layers {
             x = match *step {
                 Step::Relu => linear.forward_relu(tape, x)?,
@@ -105,10 +109,10 @@ impl Mlp {
             };
             match *step {
                 Step::Prelu(slope) => {
-                    let slope = tape.block(slope);
+                    let slope = tape.block(slope)?;
                     x = tape.prelu(x, slope)?;
                 }
-                Step::Plu => x = tape.plu(x),
+                Step::Plu => x = tape.plu(x)?,
                 Step::Identity | Step::Relu => {}
             }
         }

@@ -53,17 +53,20 @@ pub struct TransformerEncoderLayer {
 
 impl TransformerEncoderLayer {
     /// Adds `{name}.self_attn`, `.linear1`, `.linear2`, `.norm1`, `.norm2`.
+    ///
+    /// # Errors
+    /// Heads that do not divide the width.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: TransformerSizes,
-    ) -> Self {
-        Self {
-            self_attention: MultiHeadAttention::new(init, &format!("{name}.self_attn"), sizes),
+    ) -> Result<Self, AutogradError> {
+        Ok(Self {
+            self_attention: MultiHeadAttention::new(init, &format!("{name}.self_attn"), sizes)?,
             feed_forward: FeedForward::new(init, name, sizes),
             norms: [1, 2].map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
             dropout: sizes.dropout,
-        }
+        })
     }
 
     /// Tokens `x [windows * tokens, d]`, in windows of `tokens`, to the same shape.
@@ -110,20 +113,23 @@ pub struct TransformerDecoderLayer {
 impl TransformerDecoderLayer {
     /// Adds `{name}.self_attn`, `.multihead_attn`, `.linear1`, `.linear2`, `.norm1`, `.norm2`,
     /// `.norm3`.
+    ///
+    /// # Errors
+    /// Heads that do not divide the width.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
         name: &str,
         sizes: TransformerSizes,
-    ) -> Self {
+    ) -> Result<Self, AutogradError> {
         let mut attention =
             |kind: &str| MultiHeadAttention::new(init, &format!("{name}.{kind}"), sizes);
-        Self {
-            self_attention: attention("self_attn"),
-            memory_attention: attention("multihead_attn"),
+        Ok(Self {
+            self_attention: attention("self_attn")?,
+            memory_attention: attention("multihead_attn")?,
             feed_forward: FeedForward::new(init, name, sizes),
             norms: [1, 2, 3].map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
             dropout: sizes.dropout,
-        }
+        })
     }
 
     /// Keys and values of a memory `[rows, d]` for [`TransformerDecoderLayer::forward_attended`],

@@ -55,6 +55,44 @@ impl AdamConfig {
         }
     }
 
+    /// Checks every setting by itself.
+    ///
+    /// # Errors
+    /// The first out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let unless = |valid: bool, key: &str, value: f64, expected| match valid {
+            true => Ok(()),
+            false => Err(SettingError {
+                key: key.into(),
+                value,
+                expected,
+            }),
+        };
+        let positive = |key: &str, x: f64| {
+            let valid = x > 0.0 && x.is_finite();
+            unless(valid, key, x, "a number above 0")
+        };
+        let beta = |key: &str, x: f64| {
+            let valid = (0.0..1.0).contains(&x);
+            unless(valid, key, x, "at least 0 and below 1")
+        };
+        positive("learning_rate", self.learning_rate)?;
+        for (group, &rate) in &self.rates {
+            positive(&format!("rates.{group}"), rate)?;
+        }
+        beta("beta1", self.beta1)?;
+        beta("beta2", self.beta2)?;
+        positive("epsilon", self.epsilon)?;
+        if let Some(norm) = self.clip_norm {
+            positive("clip_norm", norm)?;
+        }
+        let share = self
+            .rate_schedule
+            .map_or(0.0, |schedule| schedule.final_share);
+        let (key, valid) = ("rate_schedule.final_share", (0.0..=1.0).contains(&share));
+        unless(valid, key, share, "at least 0 and at most 1")
+    }
+
     /// The rate of a group of weights over that of the others, the same at every step.
     fn share_of(&self, group: Option<&str>) -> f64 {
         group
@@ -77,12 +115,29 @@ impl Default for AdamConfig {
     }
 }
 
-/// A gradient that holds a NaN or an infinity; no weight was changed.
+/// A setting, or the learning rate of a step, that is out of its range.
 #[derive(Debug, Clone, PartialEq, Error)]
-#[error("the gradient of {parameter} {shape:?} holds a NaN or an infinity")]
-pub struct NonFiniteGradient {
-    pub parameter: String,
-    pub shape: Vec<usize>,
+#[error("{key} = {value}: expected {expected}")]
+pub struct SettingError {
+    pub key: String,
+    pub value: f64,
+    pub expected: &'static str,
+}
+
+/// Why there is no optimiser, or no step of it; then no weight was changed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum AdamError {
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    #[error(
+        "the weights or gradients are those of other parameters than the optimiser was made for"
+    )]
+    OtherParameters,
+    #[error("the gradient of {parameter} {shape:?} holds a NaN or an infinity")]
+    NonFinite {
+        parameter: String,
+        shape: Vec<usize>,
+    },
 }
 
 /// The optimiser's state: two moments for every weight, and the number of steps.
@@ -112,11 +167,15 @@ struct Factors<T> {
 impl<T: Real> Adam<T> {
     /// Moments of zero for every parameter. `rate_group` says of a parameter's name which of
     /// [`AdamConfig::rates`] is its own.
+    ///
+    /// # Errors
+    /// A setting out of its range.
     pub fn new<'g>(
         config: AdamConfig,
         parameters: &Parameters<T>,
         rate_group: impl Fn(&str) -> Option<&'g str>,
-    ) -> Self {
+    ) -> Result<Self, SettingError> {
+        config.check()?;
         let zeros = || -> Vec<Vec<T>> {
             parameters
                 .iter()
@@ -125,13 +184,13 @@ impl<T: Real> Adam<T> {
         };
         let share = |name: &str| config.share_of(rate_group(name));
         let shares = parameters.iter().map(|(name, _)| share(name)).collect();
-        Self {
+        Ok(Self {
             config,
             steps: 0,
             shares,
             first: zeros(),
             second: zeros(),
-        }
+        })
     }
 
     /// Steps done.
@@ -165,38 +224,47 @@ impl<T: Real> Adam<T> {
     /// rayon's current pool; the result does not depend on its threads.
     ///
     /// # Errors
-    /// A gradient that is not finite; then no weight, no moment is changed, and the gradients are
+    /// A gradient that is not finite, a learning rate that is no number from 0, weights or
+    /// gradients of other parameters; then no weight, no moment is changed, and the gradients are
     /// undefined.
-    ///
-    /// # Panics
-    /// When the gradients are of other parameters.
     pub fn step(
         &mut self,
         parameters: &mut Parameters<T>,
         shards: &mut [Gradients<T>],
         learning_rate: f64,
-    ) -> Result<f64, NonFiniteGradient> {
+    ) -> Result<f64, AdamError> {
+        let lengths = parameters.iter().map(|(_, value)| value.len());
+        if !lengths.eq(self.first.iter().map(Vec::len))
+            || !shards.iter().all(|shard| shard.fit(parameters))
+        {
+            return Err(AdamError::OtherParameters);
+        }
         let Some((sum, rest)) = shards.split_first_mut() else {
             return Ok(0.0);
         };
         let norm = total_norm(parameters, add(sum, rest))?;
-        self.steps += 1;
+        let steps = self.steps.saturating_add(1);
         let factors: Vec<_> = self
             .shares
             .iter()
-            .map(|share| self.factors(norm, learning_rate * share))
+            .map(|share| self.factors(steps, norm, learning_rate * share))
             .collect();
+        let finite = factors.iter().all(|factors| factors.rate.is_finite());
+        if !(learning_rate >= 0.0 && finite) {
+            return Err(AdamError::Setting(SettingError {
+                key: "the learning rate of a step".into(),
+                value: learning_rate,
+                expected: "a number, 0 or more",
+            }));
+        }
+        self.steps = steps;
         let chunks: Vec<_> = parameters
             .values_mut()
             .zip(sum.iter_mut())
             .zip(self.first.iter_mut().zip(&mut self.second))
             .zip(factors)
             .flat_map(|((((_, w), g), (m, v)), factors)| {
-                let w = w.as_slice_mut().expect("a parameter is in standard layout");
-                assert!(
-                    w.len() == g.len() && w.len() == m.len(),
-                    "Adam's gradients are of the parameters that it was made for"
-                );
+                let w = w.into_slice().expect("a parameter is in standard layout");
                 w.chunks_mut(CHUNK)
                     .zip(g.chunks_mut(CHUNK))
                     .zip(m.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)))
@@ -209,7 +277,7 @@ impl<T: Real> Adam<T> {
         Ok(norm)
     }
 
-    fn factors(&self, norm: f64, learning_rate: f64) -> Factors<T> {
+    fn factors(&self, steps: u64, norm: f64, learning_rate: f64) -> Factors<T> {
         let AdamConfig {
             beta1,
             beta2,
@@ -217,7 +285,7 @@ impl<T: Real> Adam<T> {
             clip_norm,
             ..
         } = self.config;
-        let correction = |beta: f64| 1.0 - beta.powf(self.steps as f64);
+        let correction = |beta: f64| 1.0 - beta.powf(steps as f64);
         let clip = clip_norm.map_or(1.0, |limit| (limit / (norm + 1e-6)).min(1.0));
         Factors {
             gradient: T::from_f64(clip),
@@ -293,16 +361,13 @@ fn sum_of_squares<T: Real>(values: &[T]) -> f64 {
     )
 }
 
-fn total_norm<T: Real>(
-    parameters: &Parameters<T>,
-    squares: Vec<f64>,
-) -> Result<f64, NonFiniteGradient> {
+fn total_norm<T: Real>(parameters: &Parameters<T>, squares: Vec<f64>) -> Result<f64, AdamError> {
     let bad = parameters
         .iter()
         .zip(&squares)
         .find(|(_, square)| !square.is_finite());
     match bad {
-        Some(((name, value), _)) => Err(NonFiniteGradient {
+        Some(((name, value), _)) => Err(AdamError::NonFinite {
             parameter: name.into(),
             shape: value.shape().to_vec(),
         }),

@@ -3,5 +3,5 @@
 mod adam;
 mod learning_rate;
 
-pub use adam::{Adam, AdamConfig, NonFiniteGradient};
+pub use adam::{Adam, AdamConfig, AdamError, SettingError};
 pub use learning_rate::{RateSchedule, RateShape};

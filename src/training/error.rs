@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use crate::data::EmptyPart;
 use crate::models::ModelError;
+use crate::optim::SettingError;
 use crate::run::{FileError, RunError};
 
 /// Why a training cannot begin, go on or be saved.
@@ -35,6 +36,12 @@ pub enum TrainingError {
          such as 0.1, or leave [validation] out"
     )]
     NoValidationClips(#[from] EmptyPart),
+}
+
+impl From<SettingError> for TrainingError {
+    fn from(error: SettingError) -> Self {
+        Self::Refused(format!("optimiser.{error}"))
+    }
 }
 
 impl From<FileError> for TrainingError {

@@ -29,7 +29,7 @@ impl MeasuredStep {
     /// Steps of the config's model on `batch` windows of `frames` frames.
     ///
     /// # Errors
-    /// A config that has nothing to train, no threads to be had.
+    /// A config that has nothing to train or settings out of their range, no threads to be had.
     pub fn new(
         config: &ExperimentConfig,
         frames: usize,
@@ -46,7 +46,7 @@ impl MeasuredStep {
             streams,
             adam: Adam::new(config.optimiser.clone(), &parameters, |name| {
                 task.rate_group(name)
-            }),
+            })?,
             task,
             stepper: Stepper::new(threads)?,
             parameters,

@@ -8,7 +8,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::error::TrainingError;
 use crate::autograd::{AutogradError, BufferId, Gradients, Parameters, Tape, Workspace};
 use crate::models::{Step, Streams};
-use crate::optim::Adam;
+use crate::optim::{Adam, AdamError};
 
 /// What a step is given.
 #[derive(Clone, Copy)]
@@ -123,7 +123,7 @@ impl Stepper {
         let norm = pool.install(|| adam.step(parameters, gradients, input.learning_rate));
         match norm {
             Ok(norm) => {
-                take_up_buffers(parameters, &sum.buffers);
+                take_up_buffers(parameters, &sum.buffers).map_err(|cause| failure(input, cause))?;
                 match first_not_finite(parameters) {
                     None => Ok((sum, norm)),
                     Some((name, shape)) => Err(non_finite(
@@ -131,6 +131,9 @@ impl Stepper {
                         format!("it left {name} {shape:?} with a NaN or an infinity"),
                     )),
                 }
+            }
+            Err(error @ (AdamError::Setting(_) | AdamError::OtherParameters)) => {
+                Err(refused(input, &error))
             }
             Err(error) => {
                 let cause = trace(input, parameters, gradients).map(|cause| cause.to_string());
@@ -156,7 +159,10 @@ fn trace(
 }
 
 /// Each buffer becomes the mean of the values that shards give for it, in the order of the shards.
-fn take_up_buffers(parameters: &mut Parameters<f32>, given: &[(BufferId, Vec<f64>)]) {
+fn take_up_buffers(
+    parameters: &mut Parameters<f32>,
+    given: &[(BufferId, Vec<f64>)],
+) -> Result<(), AutogradError> {
     let mut done: Vec<BufferId> = Vec::new();
     for (id, _) in given {
         if done.contains(id) {
@@ -165,11 +171,12 @@ fn take_up_buffers(parameters: &mut Parameters<f32>, given: &[(BufferId, Vec<f64
         done.push(*id);
         let of_buffer = || given.iter().filter(|(of, _)| of == id);
         let count = of_buffer().count() as f64;
-        for (index, value) in parameters.buffer_mut(*id).iter_mut().enumerate() {
+        for (index, value) in parameters.buffer_mut(*id)?.iter_mut().enumerate() {
             let values = of_buffer().filter_map(|(_, values)| values.get(index));
             *value = (values.sum::<f64>() / count) as f32;
         }
     }
+    Ok(())
 }
 
 /// The first parameter or buffer with a NaN or an infinity, and its shape.
@@ -197,11 +204,15 @@ fn run_shard(
         tape = tape.with_trace();
     }
     let losses = input.step.losses(&mut tape, shard)?;
-    let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
+    let number = |var| -> Result<f64, AutogradError> {
+        Ok(tape.values(var)?.iter().map(|&x| f64::from(x)).sum())
+    };
     let terms = losses.terms.iter();
     let values = Losses {
-        total: number(losses.total),
-        terms: terms.map(|&(name, var)| (name, number(var))).collect(),
+        total: number(losses.total)?,
+        terms: terms
+            .map(|&(name, var)| Ok((name, number(var)?)))
+            .collect::<Result<_, AutogradError>>()?,
         buffers: losses.buffers,
     };
     if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {
@@ -214,11 +225,13 @@ fn run_shard(
 fn failure(input: StepInput<'_>, cause: AutogradError) -> TrainingError {
     match cause {
         AutogradError::NonFinite { .. } => non_finite(input, cause.to_string()),
-        cause => {
-            let (step, what) = (input.done + 1, input.step.describe());
-            TrainingError::Refused(format!("step {step} ({what}): {cause}"))
-        }
+        cause => refused(input, &cause),
     }
+}
+
+fn refused(input: StepInput<'_>, cause: &dyn std::error::Error) -> TrainingError {
+    let (step, what) = (input.done + 1, input.step.describe());
+    TrainingError::Refused(format!("step {step} ({what}): {cause}"))
 }
 
 fn non_finite(input: StepInput<'_>, cause: String) -> TrainingError {

@@ -90,7 +90,7 @@ impl<'d> Trainer<'d> {
             streams,
             adam: Adam::new(config.optimiser.clone(), &parameters, |name| {
                 task.rate_group(name)
-            }),
+            })?,
             task,
             parameters,
             stepper: Stepper::new(threads)?,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use keydance::autograd::{Gradients, Parameters, Real};
-use keydance::optim::{Adam, AdamConfig};
+use keydance::optim::{Adam, AdamConfig, AdamError, RateSchedule};
 use ndarray::ArrayD;
 
 fn parameters<T: Real>(values: &[&[f64]]) -> Parameters<T> {
@@ -59,7 +59,7 @@ fn steps_follow_the_published_algorithm() {
     let gradient =
         |t: usize, i: usize| ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6);
     let mut parameters = parameters::<f64>(&[&start]);
-    let mut adam = Adam::new(config.clone(), &parameters, |_| None);
+    let mut adam = Adam::new(config.clone(), &parameters, |_| None).unwrap();
     for t in 0..20 {
         // Two shards that add up to the gradient.
         let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
@@ -86,7 +86,7 @@ fn steps_follow_the_published_algorithm() {
 fn a_constant_gradient_moves_a_weight_by_the_learning_rate_a_step() {
     // With g constant both corrected moments are exact: every step is rate * g / (|g| + eps).
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0, 3.0]]);
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
     for _ in 0..5 {
         let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
         adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
@@ -108,7 +108,8 @@ fn a_group_of_weights_has_a_rate_of_its_own() {
     let mut both = parameters::<f64>(&[&start, &start]);
     let mut adam = Adam::new(config.clone(), &both, |name| {
         (name == "p1").then_some("slow")
-    });
+    })
+    .unwrap();
     // Half the rate of the config, as a schedule has it.
     for t in 0..5 {
         let gradients = gradients(&both, |_, i| (i + t) as f64 - 1.5);
@@ -116,7 +117,7 @@ fn a_group_of_weights_has_a_rate_of_its_own() {
     }
     for (k, rate) in [5e-4, 1e-4].into_iter().enumerate() {
         let mut alone = parameters::<f64>(&[&start]);
-        let mut adam = Adam::new(config.clone(), &alone, |_| None);
+        let mut adam = Adam::new(config.clone(), &alone, |_| None).unwrap();
         for t in 0..5 {
             let gradients = gradients(&alone, |_, i| (i + t) as f64 - 1.5);
             adam.step(&mut alone, &mut [gradients], rate).unwrap();
@@ -140,7 +141,7 @@ fn a_long_gradient_is_scaled_to_the_limit_over_all_parameters() {
     };
     let run = |config, scale: f64| {
         let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
-        let mut adam = Adam::new(config, &parameters, |_| None);
+        let mut adam = Adam::new(config, &parameters, |_| None).unwrap();
         let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
         let norm = adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
         (norm, weights(&parameters))
@@ -158,7 +159,7 @@ fn a_long_gradient_is_scaled_to_the_limit_over_all_parameters() {
 #[test]
 fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
     let before = (weights(&parameters), adam.clone());
     for bad in [f64::NAN, f64::INFINITY] {
         let gradients = gradients(
@@ -168,9 +169,113 @@ fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
         let error = adam
             .step(&mut parameters, &mut [gradients], 1e-4)
             .unwrap_err();
-        assert_eq!((error.parameter.as_str(), error.shape), ("p1", vec![20]));
+        let expected = AdamError::NonFinite {
+            parameter: "p1".into(),
+            shape: vec![20],
+        };
+        assert_eq!(error, expected);
     }
     assert_eq!((weights(&parameters), adam), before);
+}
+
+#[test]
+fn a_learning_rate_that_is_none_or_gradients_of_other_parameters_change_nothing() {
+    let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
+    let before = (weights(&parameters), adam.clone());
+    for rate in [f64::NAN, -1e-4, f64::INFINITY, 1e300] {
+        let gradients = gradients(&parameters, |_, _| 1.0);
+        let error = adam
+            .step(&mut parameters, &mut [gradients], rate)
+            .unwrap_err();
+        assert!(error.to_string().contains("learning rate"), "{error}");
+    }
+    let mut others: Vec<Parameters<f32>> = vec![Parameters::new()];
+    for sizes in [vec![2], vec![2, 19], vec![20, 2], vec![2, 20, 1]] {
+        let values: Vec<Vec<f64>> = sizes.iter().map(|&size| vec![0.0; size]).collect();
+        let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        others.push(self::parameters(&values));
+    }
+    for mut other in others {
+        let own = gradients(&parameters, |_, _| 1.0);
+        let of_other = gradients(&other, |_, _| 1.0);
+        let refused = |error| assert_eq!(error, Err(AdamError::OtherParameters));
+        refused(adam.step(&mut parameters, &mut [of_other.clone()], 1e-4));
+        // The first shard fits, one after it does not.
+        refused(adam.step(&mut parameters, &mut [own, of_other.clone()], 1e-4));
+        refused(adam.step(&mut other, &mut [of_other], 1e-4));
+    }
+    assert_eq!((weights(&parameters), adam), before);
+}
+
+#[test]
+fn settings_out_of_their_range_make_no_optimiser() {
+    let parameters = parameters::<f32>(&[&[1.0]]);
+    let default = AdamConfig::default;
+    for (key, config) in [
+        (
+            "learning_rate",
+            AdamConfig {
+                learning_rate: f64::NAN,
+                ..default()
+            },
+        ),
+        (
+            "learning_rate",
+            AdamConfig {
+                learning_rate: 0.0,
+                ..default()
+            },
+        ),
+        (
+            "rates.slow",
+            AdamConfig {
+                rates: BTreeMap::from([("slow".into(), -1.0)]),
+                ..default()
+            },
+        ),
+        (
+            "beta1",
+            AdamConfig {
+                beta1: 1.0,
+                ..default()
+            },
+        ),
+        (
+            "beta2",
+            AdamConfig {
+                beta2: f64::NAN,
+                ..default()
+            },
+        ),
+        (
+            "epsilon",
+            AdamConfig {
+                epsilon: -1e-8,
+                ..default()
+            },
+        ),
+        (
+            "clip_norm",
+            AdamConfig {
+                clip_norm: Some(f64::NAN),
+                ..default()
+            },
+        ),
+        (
+            "rate_schedule.final_share",
+            AdamConfig {
+                rate_schedule: Some(RateSchedule {
+                    final_share: f64::NAN,
+                    ..RateSchedule::default()
+                }),
+                ..default()
+            },
+        ),
+    ] {
+        let error = Adam::new(config, &parameters, |_| None).unwrap_err();
+        assert_eq!(error.key, key);
+    }
 }
 
 #[test]
@@ -189,7 +294,8 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
             },
             &parameters,
             |_| None,
-        );
+        )
+        .unwrap();
         for t in 0..3 {
             let mut shards: Vec<_> = (0..4)
                 .map(|s| gradients(&parameters, |_, i| ((i + s * 31 + t) as f64).cos()))

@@ -76,7 +76,7 @@ impl Golden {
             .keys()
             .filter(|name| name.starts_with("weight."));
         assert_eq!(recorded.count(), parameters.len());
-        for (name, value) in parameters.values_mut() {
+        for (name, mut value) in parameters.values_mut() {
             let weight = &self.tensors[&format!("weight.{name}")];
             assert_eq!(weight.shape(), value.shape(), "{name}");
             value.assign(weight);
@@ -134,7 +134,7 @@ fn check(transition: usize, forcing: Forcing) {
         };
         assert_close(
             &format!("{case}: {name}"),
-            tape.values(var).iter(),
+            tape.values(var).unwrap().iter(),
             &[recorded],
         );
     }

@@ -149,7 +149,7 @@ fn losses(built: &Built<f64>, batches: &[Batch<f64>], dropout: Option<u64>) -> L
             .losses(&mut tape, batch, Forcing::FreeRunning)
             .unwrap();
         for (name, var) in losses.terms.into_iter().chain([("total", losses.total)]) {
-            *values.entry(name).or_insert(0.0) += tape.values(var)[0];
+            *values.entry(name).or_insert(0.0) += tape.values(var).unwrap()[0];
         }
         tape.backward(losses.total, &mut gradients).unwrap();
     }
@@ -259,7 +259,7 @@ fn predict(built: &Built<f64>, batch: &Batch<f64>) -> Array3<f64> {
 fn calm(transition: usize, windows: usize) -> (Built<f64>, Batch<f64>, Standardisation) {
     let (batch, standardisation) = generated_batch(transition, windows, 13).unwrap();
     let mut built: Built<f64> = build(&adversarial().small(), &standardisation);
-    for (name, value) in built.parameters.values_mut() {
+    for (name, mut value) in built.parameters.values_mut() {
         if name.starts_with("decoder.4") {
             value.mapv_inplace(|x| 0.5 * x);
         }
@@ -480,7 +480,7 @@ fn forward_kinematics_on_the_tape_are_those_of_the_clips() {
     let joints = tape
         .forward_kinematics(rotations, offsets, &DANCE_PARENTS)
         .unwrap();
-    let joints = Array2::from_shape_vec((rows, 72), tape.values(joints).to_vec()).unwrap();
+    let joints = Array2::from_shape_vec((rows, 72), tape.values(joints).unwrap().to_vec()).unwrap();
     for row in 0..rows {
         let frame = batch.features.slice(s![row / 4, row % 4..=row % 4, ..]);
         let world = world_positions(standardisation.restore(frame).row(0));
@@ -506,7 +506,7 @@ fn the_network_learns_one_window_by_heart() {
         learning_rate: 5e-3,
         ..AdamConfig::default()
     };
-    let mut adam = Adam::new(settings.clone(), &built.parameters, |_| None);
+    let mut adam = Adam::new(settings.clone(), &built.parameters, |_| None).unwrap();
     let mut gradients = [Gradients::zeros(&built.parameters)];
     let mut workspace = Workspace::new();
     let mut position = Vec::new();
@@ -517,7 +517,7 @@ fn the_network_learns_one_window_by_heart() {
             .losses(&mut tape, &batch, Forcing::FreeRunning)
             .unwrap();
         let term = losses.terms.iter().find(|(name, _)| *name == "position");
-        position.push(tape.values(term.unwrap().1)[0]);
+        position.push(tape.values(term.unwrap().1).unwrap()[0]);
         tape.backward(losses.total, &mut gradients[0]).unwrap();
         let rate = settings.learning_rate;
         adam.step(&mut built.parameters, &mut gradients, rate)

@@ -55,7 +55,7 @@ impl<T: Real> Built<T> {
     /// residual network begins with.
     pub fn disturbed(mut self) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        for (_, value) in self.parameters.values_mut() {
+        for (_, mut value) in self.parameters.values_mut() {
             value.mapv_inplace(|x| x + T::from_f64(rng.random_range(-0.1..0.1)));
         }
         self

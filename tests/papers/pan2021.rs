@@ -302,7 +302,7 @@ fn losses(config: &Pan2021Config, forcing: Forcing) -> BTreeMap<&'static str, f6
     let losses = built.network.losses(&mut tape, &batch, forcing).unwrap();
     let values = losses.terms.into_iter().chain([("total", losses.total)]);
     values
-        .map(|(name, var)| (name, tape.values(var)[0]))
+        .map(|(name, var)| (name, tape.values(var).unwrap()[0]))
         .collect()
 }
 
@@ -515,7 +515,7 @@ fn predictions_are_the_frames_whose_losses_training_takes() {
                 .find(|(term, _)| *term == name)
                 .unwrap()
                 .1;
-            let term = tape.values(term)[0];
+            let term = tape.values(term).unwrap()[0];
             assert!((ours - term).abs() < 1e-12 * term, "{name}: {ours} {term}");
         }
     }
@@ -532,7 +532,7 @@ fn gradients_of(built: &Built<f64>, batches: &[Batch<f64>], forcing: Forcing) ->
             .losses(&mut tape, batch, forcing)
             .unwrap()
             .total;
-        sum += tape.values(total)[0];
+        sum += tape.values(total).unwrap()[0];
         tape.backward(total, &mut gradients).unwrap();
     }
     (sum, gradients.iter().flatten().copied().collect())
@@ -581,7 +581,7 @@ fn features_of_another_shape_are_refused_with_their_shape() {
 
 /// Sets columns of a weight to zero: what enters there is not read.
 fn cut_columns(built: &mut Built<f64>, weight: &str, columns: std::ops::Range<usize>) {
-    let (_, value) = built
+    let (_, mut value) = built
         .parameters
         .values_mut()
         .find(|(name, _)| *name == weight)
@@ -652,7 +652,7 @@ fn each_output_of_the_decoders_is_its_number_of_the_frame() {
         let mut built: Built<f64> = build(&config.small(), &standardisation);
         let before = predict(&built, &features);
         let values = built.parameters.values_mut();
-        for (_, value) in values.filter(|(name, _)| *name == bias) {
+        for (_, mut value) in values.filter(|(name, _)| *name == bias) {
             value.as_slice_mut().unwrap()[output] += 1.0;
         }
         let moved = predict(&built, &features) - before;

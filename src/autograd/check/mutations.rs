@@ -29,15 +29,22 @@ impl Operation<f64> for Difference {
     }
 }
 
-fn difference(tape: &mut Tape<'_, f64>, a: Var, b: Var, mistake: bool) -> Var {
-    let shape = tape.shape(a).to_vec();
-    let pairs = tape.values(a).iter().zip(tape.values(b));
+fn difference(
+    tape: &mut Tape<'_, f64>,
+    a: Var,
+    b: Var,
+    mistake: bool,
+) -> Result<Var, AutogradError> {
+    let shape = tape.shape(a)?.to_vec();
+    let pairs = tape.values(a)?.iter().zip(tape.values(b)?);
     let y = pairs.map(|(a, b)| a - b).collect();
-    tape.record("difference", &[a, b], &shape, y, || Difference {
-        a,
-        b,
-        mistake,
-    })
+    Ok(
+        tape.record("difference", &[a, b], &shape, y, || Difference {
+            a,
+            b,
+            mistake,
+        }),
+    )
 }
 
 /// x [rows, n] + b [n]; the mistake: db is that of the last row, not the sum over rows.
@@ -61,16 +68,16 @@ impl Operation<f64> for Shift {
     }
 }
 
-fn shift(tape: &mut Tape<'_, f64>, x: Var, b: Var, mistake: bool) -> Var {
-    let shape = tape.shape(x).to_vec();
-    let bias = tape.values(b).iter().cycle();
+fn shift(tape: &mut Tape<'_, f64>, x: Var, b: Var, mistake: bool) -> Result<Var, AutogradError> {
+    let shape = tape.shape(x)?.to_vec();
+    let bias = tape.values(b)?.iter().cycle();
     let y = tape
-        .values(x)
+        .values(x)?
         .iter()
         .zip(bias)
         .map(|(x, b)| x + b)
         .collect();
-    tape.record("shift", &[x, b], &shape, y, || Shift { x, b, mistake })
+    Ok(tape.record("shift", &[x, b], &shape, y, || Shift { x, b, mistake }))
 }
 
 /// A B for matrices [n, n]; the mistake: dA = dC B instead of dC B^T.
@@ -97,23 +104,23 @@ impl Operation<f64> for Product {
     }
 }
 
-fn matrices(tape: &mut Tape<'_, f64>, a: Var, b: Var, mistake: bool) -> Var {
-    let n = tape.shape(a)[0];
+fn matrices(tape: &mut Tape<'_, f64>, a: Var, b: Var, mistake: bool) -> Result<Var, AutogradError> {
+    let n = tape.shape(a)?[0];
     let mut y = vec![0.0; n * n];
     let (left, right) = (
-        Mat::new(tape.values(a), n, n),
-        Mat::new(tape.values(b), n, n),
+        Mat::new(tape.values(a)?, n, n),
+        Mat::new(tape.values(b)?, n, n),
     );
     product(left, right, MatMut::new(&mut y, n, n), false);
-    tape.record("product", &[a, b], &[n, n], y, || Product {
+    Ok(tape.record("product", &[a, b], &[n, n], y, || Product {
         a,
         b,
         n,
         mistake,
-    })
+    }))
 }
 
-type Build = fn(&mut Tape<'_, f64>, Var, Var, bool) -> Var;
+type Build = fn(&mut Tape<'_, f64>, Var, Var, bool) -> Result<Var, AutogradError>;
 
 /// What [`check_parameters`] finds of the sum of squares of an operation on two parameters.
 fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport {
@@ -126,20 +133,20 @@ fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport
         parameters.add(format!("operand {k}"), value).1
     });
     let loss = |tape: &mut Tape<'_, f64>| {
-        let [a, b] = blocks.map(|block| tape.block(block));
-        let y = build(tape, a, b, mistake);
-        let squares = tape.square(y);
+        let (a, b) = (tape.block(blocks[0])?, tape.block(blocks[1])?);
+        let y = build(tape, a, b, mistake)?;
+        let squares = tape.square(y)?;
         tape.sum(squares)
     };
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&parameters);
     let mut tape = Tape::recording(&parameters, &mut workspace);
-    let total = loss(&mut tape);
+    let total = loss(&mut tape).unwrap();
     tape.backward(total, &mut gradients).unwrap();
     check_parameters(&mut parameters, &gradients, 100, |parameters, _| {
         let mut tape = Tape::inference(parameters, &mut workspace);
-        let total = loss(&mut tape);
-        Ok(tape.values(total)[0])
+        let total = loss(&mut tape)?;
+        Ok(tape.values(total)?[0])
     })
     .unwrap()
 }
@@ -147,7 +154,7 @@ fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport
 fn only_the_mistake_is_caught(shapes: [&[usize]; 2], build: Build) {
     for mistake in [false, true] {
         let property = check_case(&case(&shapes, 7, 0.0, move |tape, v| {
-            Ok(build(tape, v[0], v[1], mistake))
+            build(tape, v[0], v[1], mistake)
         }));
         assert_eq!(property.is_err(), mistake, "property: {property:?}");
         let report = whole_loss(shapes, build, mistake);

@@ -82,7 +82,7 @@ fn scalar(case: &Case, inputs: &[ArrayD<f64>]) -> f64 {
     let mut tape = Tape::recording(&parameters, &mut workspace);
     let vars: Vec<Var> = inputs.iter().map(|x| tape.constant(x.clone())).collect();
     let y = (case.build)(&mut tape, &vars).expect("the case is valid");
-    let values = tape.values(y);
+    let values = tape.values(y).unwrap();
     let weights = upstream(values.len(), case.seed);
     values.iter().zip(&weights).map(|(a, b)| a * b).sum()
 }
@@ -90,6 +90,13 @@ fn scalar(case: &Case, inputs: &[ArrayD<f64>]) -> f64 {
 pub(super) fn check_case(case: &Case) -> Result<(), TestCaseError> {
     let as_values = gradients_of_values(case);
     let as_parameters = gradients_of_parameters(case);
+    for (i, gradient) in as_values.iter().enumerate() {
+        // Where it has a gradient the case reads it.
+        let read = gradient.iter().any(|&g| g != 0.0);
+        let foreign = with_a_value_of_another_tape(case, i);
+        let refused = matches!(foreign, Err(AutogradError::Misplaced { .. }));
+        prop_assert!(refused || !read, "input {i} of another tape: {foreign:?}");
+    }
     let centre = scalar(case, &case.inputs);
     for (i, input) in case.inputs.iter().enumerate() {
         for k in 0..input.len() {
@@ -112,6 +119,20 @@ pub(super) fn check_case(case: &Case) -> Result<(), TestCaseError> {
     Ok(())
 }
 
+/// The operation with its inputs on one tape but number `other`, which is on an earlier one.
+fn with_a_value_of_another_tape(case: &Case, other: usize) -> Result<Var, AutogradError> {
+    let parameters = Parameters::new();
+    let mut workspace = Workspace::new();
+    let inputs = |tape: &mut Tape<'_, f64>| -> Vec<Var> {
+        case.inputs.iter().map(|x| tape.input(x.clone())).collect()
+    };
+    let earlier = inputs(&mut Tape::recording(&parameters, &mut workspace));
+    let mut tape = Tape::recording(&parameters, &mut workspace);
+    let mut vars = inputs(&mut tape);
+    vars[other] = earlier[other];
+    (case.build)(&mut tape, &vars)
+}
+
 fn gradients_of_values(case: &Case) -> Vec<Vec<f64>> {
     let parameters = Parameters::new();
     let mut workspace = Workspace::new();
@@ -119,7 +140,7 @@ fn gradients_of_values(case: &Case) -> Vec<Vec<f64>> {
     let mut tape = Tape::recording(&parameters, &mut workspace);
     let vars: Vec<Var> = case.inputs.iter().map(|x| tape.input(x.clone())).collect();
     let y = (case.build)(&mut tape, &vars).expect("the case is valid");
-    let weights = upstream(tape.values(y).len(), case.seed);
+    let weights = upstream(tape.values(y).unwrap().len(), case.seed);
     tape.backward_from(y, &weights, &vars, &mut gradients)
         .expect("finite")
         .into_iter()
@@ -138,9 +159,9 @@ fn gradients_of_parameters(case: &Case) -> Vec<Vec<f64>> {
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&parameters);
     let mut tape = Tape::recording(&parameters, &mut workspace);
-    let vars: Vec<Var> = blocks.iter().map(|&b| tape.block(b)).collect();
+    let vars: Vec<Var> = blocks.iter().map(|&b| tape.block(b).unwrap()).collect();
     let y = (case.build)(&mut tape, &vars).expect("the case is valid");
-    let weights = upstream(tape.values(y).len(), case.seed);
+    let weights = upstream(tape.values(y).unwrap().len(), case.seed);
     tape.backward_from(y, &weights, &[], &mut gradients)
         .expect("finite");
     gradients.iter().map(<[f64]>::to_vec).collect()

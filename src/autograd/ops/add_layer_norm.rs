@@ -10,7 +10,7 @@ impl<T: Real> Tape<'_, T> {
     /// `layer_norm(residual + dropout(x, p))` with `gamma`, `beta [n]`; `x`, `residual [.., n]`.
     ///
     /// # Errors
-    /// Shapes that do not fit.
+    /// Shapes that do not fit; a probability that is none.
     pub fn add_layer_norm(
         &mut self,
         x: Var,
@@ -18,8 +18,8 @@ impl<T: Real> Tape<'_, T> {
         (gamma, beta): (Var, Var),
         p: f64,
     ) -> Result<Var, AutogradError> {
-        let dropout = self.next_draws(p);
         let name = "add_layer_norm";
+        let dropout = self.next_draws(name, p)?;
         layer_norm(self, name, x, Some(residual), (gamma, beta), dropout)
     }
 }

@@ -5,11 +5,14 @@
 //! ```
 
 use super::unary::unary;
-use crate::autograd::{Real, Tape, Var};
+use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
     /// scale x + shift, elementwise.
-    pub fn affine(&mut self, x: Var, scale: f64, shift: f64) -> Var {
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn affine(&mut self, x: Var, scale: f64, shift: f64) -> Result<Var, AutogradError> {
         let (scale, shift) = (T::from_f64(scale), T::from_f64(shift));
         unary(
             self,
@@ -29,7 +32,7 @@ pub(super) mod gradient {
         let inputs = (shapes(), -3.0..3.0, -3.0..3.0);
         drawn(inputs, |(x, scale, shift), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
-                Ok(tape.affine(v[0], scale, shift))
+                tape.affine(v[0], scale, shift)
             })
         })
     }

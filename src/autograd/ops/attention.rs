@@ -135,7 +135,13 @@ impl<T: Real> Attention<T> {
         output: &[usize],
     ) -> Var {
         let shape = self.shape;
+        let mut inputs = [self.q, self.k, self.v].map(|of| of.columns.value).to_vec();
+        inputs.extend(self.bias);
         let numbers: usize = output.iter().product();
+        if numbers == 0 {
+            // However many tokens a window would have.
+            return tape.record(name, &inputs, output, Vec::new(), || self);
+        }
         let windows = numbers / (shape.queries * shape.width);
         let mut p = tape.take(windows * shape.heads * shape.block());
         let mut dropped = match self.dropout {
@@ -145,11 +151,11 @@ impl<T: Real> Attention<T> {
         let mut scratch = tape.take(shape.scratch_len());
         let mut y = tape.take(numbers);
         let [q, k, v] = [self.q, self.k, self.v]
-            .map(|operand| operand.rows(tape.values(operand.columns.value)));
+            .map(|operand| operand.rows(tape.known().values(operand.columns.value)));
         let scale = T::from_f64(self.scale);
         scores(&mut p, (q, k), shape, scale, &mut scratch);
         if let Some(bias) = self.bias {
-            self.add_bias(&mut p, tape.values(bias));
+            self.add_bias(&mut p, tape.known().values(bias));
         }
         vectorised(
             #[inline(always)]
@@ -171,8 +177,6 @@ impl<T: Real> Attention<T> {
         } else {
             tape.give(p);
         }
-        let mut inputs = [self.q, self.k, self.v].map(|of| of.columns.value).to_vec();
-        inputs.extend(self.bias);
         tape.record(name, &inputs, output, y, || self)
     }
 }
@@ -235,7 +239,7 @@ impl<T: Real> Tape<'_, T> {
     ///
     /// # Errors
     /// Heads that do not divide the width, columns beyond a value, rows that are no whole windows,
-    /// a bias of another shape.
+    /// a bias of another shape, a probability that is none.
     pub fn attention(
         &mut self,
         [q, k, v]: [HeadColumns; 3],
@@ -243,17 +247,20 @@ impl<T: Real> Tape<'_, T> {
         bias: Option<Var>,
         p: f64,
     ) -> Result<Var, AutogradError> {
+        let mut operands = [q, k, v].map(|columns| columns.value).to_vec();
+        operands.extend(bias);
+        self.own("attention", &operands)?;
         let windows = self.windows(q, shape.queries, shape)?;
         for other in [k, v] {
             if self.windows(other, shape.keys, shape)? != windows {
-                let (left, right) = (self.shape(q.value), self.shape(other.value));
+                let (left, right) = (self.known().shape(q.value), self.known().shape(other.value));
                 let expected = "as many windows of queries as of keys";
                 return Err(shapes_error("attention", left, right, expected));
             }
         }
         if let Some(bias) = bias {
             let wanted = [shape.heads, shape.queries, shape.keys];
-            let found = self.shape(bias);
+            let found = self.known().shape(bias);
             if found != wanted && found != [1, shape.queries, shape.keys] {
                 let expected = "a bias [1 or heads, queries, keys]";
                 return Err(shapes_error("attention", &wanted, found, expected));
@@ -270,7 +277,7 @@ impl<T: Real> Tape<'_, T> {
             bias,
             shape,
             scale: 1.0 / (shape.head_width() as f64).sqrt(),
-            dropout: self.next_draws(p),
+            dropout: self.next_draws("attention", p)?,
             probabilities: Vec::new(),
         };
         let output = [windows * shape.queries, shape.width];
@@ -284,13 +291,15 @@ impl<T: Real> Tape<'_, T> {
         tokens: usize,
         shape: AttentionShape,
     ) -> Result<usize, AutogradError> {
-        let found = self.shape(columns.value);
+        let found = self.known().shape(columns.value);
         let fits = shape.heads > 0
             && shape.width > 0
             && shape.width.is_multiple_of(shape.heads)
             && tokens > 0;
         match *found {
-            [rows, n] if fits && rows % tokens == 0 && columns.start + shape.width <= n => {
+            [rows, n]
+                if fits && rows % tokens == 0 && columns.start.saturating_add(shape.width) <= n =>
+            {
                 Ok(rows / tokens)
             }
             _ => Err(argument_error(
@@ -328,7 +337,7 @@ pub(super) mod gradient {
             ];
             case(&shapes, seed, 0.0, move |tape, v| {
                 tape.set_dropout(dropout.then_some(seed));
-                let asking = tape.affine(v[0], strength, 0.0);
+                let asking = tape.affine(v[0], strength, 0.0)?;
                 let columns = |value, k: usize| HeadColumns {
                     value,
                     start: k * width,

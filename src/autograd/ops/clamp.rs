@@ -5,11 +5,16 @@
 //! ```
 
 use super::unary::unary;
-use crate::autograd::{Real, Tape, Var};
+use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
     /// x held between `low` and `high`, elementwise; a NaN stays one.
-    pub fn clamp(&mut self, x: Var, low: f64, high: f64) -> Var {
+    ///
+    /// # Errors
+    /// An interval that has no numbers; a value of another tape.
+    pub fn clamp(&mut self, x: Var, low: f64, high: f64) -> Result<Var, AutogradError> {
+        let expected = "at least the interval's low end";
+        AutogradError::unless(low <= high, "clamp", ("high", high), expected)?;
         let (low, high) = (T::from_f64(low), T::from_f64(high));
         let inside = move |x: T| {
             if x > low && x < high {
@@ -47,7 +52,7 @@ pub(super) mod gradient {
         drawn((shapes(), any::<bool>()), |(x, below), seed| {
             let (low, high) = if below { (-3.0, 0.0) } else { (0.0, 3.0) };
             case(&[&x], seed, 0.01, move |tape, v| {
-                Ok(tape.clamp(v[0], low, high))
+                tape.clamp(v[0], low, high)
             })
         })
     }

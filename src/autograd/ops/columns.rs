@@ -44,8 +44,8 @@ pub(super) fn columns_of<T: Real>(
 ) -> Var {
     let (start, width) = (range.start, range.len());
     let mut y = tape.take(shape.iter().product());
-    if width > 0 {
-        let rows = tape.values(x).chunks_exact(total);
+    if !y.is_empty() {
+        let rows = tape.known().values(x).chunks_exact(total);
         for (y, x) in y.chunks_exact_mut(width).zip(rows) {
             y.copy_from_slice(&x[range.clone()]);
         }
@@ -64,7 +64,8 @@ impl<T: Real> Tape<'_, T> {
     /// # Errors
     /// A range beyond the last axis.
     pub fn columns(&mut self, x: Var, range: Range<usize>) -> Result<Var, AutogradError> {
-        let mut shape = self.shape(x).to_vec();
+        self.own("columns", &[x])?;
+        let mut shape = self.known().shape(x).to_vec();
         match shape.last_mut() {
             Some(last) if range.start <= range.end && range.end <= *last => {
                 let total = std::mem::replace(last, range.len());

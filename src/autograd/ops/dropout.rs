@@ -6,7 +6,7 @@
 //! ```
 
 use crate::autograd::kernels::dropout_into;
-use crate::autograd::{Backward, Operation, Real, Tape, Var};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Dropout {
     x: Var,
@@ -31,14 +31,18 @@ impl<T: Real> Operation<T> for Dropout {
 impl<T: Real> Tape<'_, T> {
     /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself
     /// where dropout is off.
-    pub fn dropout(&mut self, x: Var, p: f64) -> Var {
-        let Some((key, p)) = self.next_draws(p) else {
-            return x;
+    ///
+    /// # Errors
+    /// A probability that is none; a value of another tape.
+    pub fn dropout(&mut self, x: Var, p: f64) -> Result<Var, AutogradError> {
+        self.own("dropout", &[x])?;
+        let Some((key, p)) = self.next_draws("dropout", p)? else {
+            return Ok(x);
         };
-        let shape = self.shape(x).to_vec();
-        let mut y = self.take(self.values(x).len());
-        dropout_into(key, p, self.values(x), &mut y);
-        self.record("dropout", &[x], &shape, y, || Dropout { x, p, key })
+        let shape = self.known().shape(x).to_vec();
+        let mut y = self.take(self.known().values(x).len());
+        dropout_into(key, p, self.known().values(x), &mut y);
+        Ok(self.record("dropout", &[x], &shape, y, || Dropout { x, p, key }))
     }
 }
 
@@ -50,7 +54,7 @@ pub(super) mod gradient {
         drawn((shapes(), 0.0..0.9), |(x, p), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
                 tape.set_dropout(Some(seed));
-                Ok(tape.dropout(v[0], p))
+                tape.dropout(v[0], p)
             })
         })
     }

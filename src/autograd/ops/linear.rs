@@ -88,8 +88,11 @@ impl<T: Real> Tape<'_, T> {
         bias: Option<Var>,
         relu: bool,
     ) -> Result<Var, AutogradError> {
+        let mut all = vec![x, weight];
+        all.extend(bias);
+        self.own("linear", &all)?;
         let (rows, inputs) = self.rows_and_columns(x);
-        let (left, right) = (self.shape(x), self.shape(weight));
+        let (left, right) = (self.known().shape(x), self.known().shape(weight));
         let outputs = match *right {
             [outputs, columns] if columns == inputs && !left.is_empty() => outputs,
             _ => {
@@ -98,23 +101,26 @@ impl<T: Real> Tape<'_, T> {
             }
         };
         if let Some(bias) = bias
-            && self.shape(bias) != [outputs]
+            && self.known().shape(bias) != [outputs]
         {
-            let (left, right) = (self.shape(weight), self.shape(bias));
+            let (left, right) = (self.known().shape(weight), self.known().shape(bias));
             let expected = "weight [out, in] and bias [out]";
             return Err(shapes_error("linear", left, right, expected));
         }
-        let mut y = self.take(rows * outputs);
-        let matrix = Mat::new(self.values(x), rows, inputs);
-        let out = MatMut::new(&mut y, rows, outputs);
-        self.known().product_transposed(matrix, weight, out, false);
-        add_bias(&mut y, bias.map(|bias| self.values(bias)), outputs, relu);
-        let mut shape = self.shape(x).to_vec();
+        let mut shape = left.to_vec();
         if let Some(last) = shape.last_mut() {
             *last = outputs;
         }
-        let mut all = vec![x, weight];
-        all.extend(bias);
+        let mut y = self.take_for("linear", &shape)?;
+        let matrix = Mat::new(self.known().values(x), rows, inputs);
+        let out = MatMut::new(&mut y, rows, outputs);
+        self.known().product_transposed(matrix, weight, out, false);
+        add_bias(
+            &mut y,
+            bias.map(|bias| self.known().values(bias)),
+            outputs,
+            relu,
+        );
         Ok(self.record("linear", &all, &shape, y, || Linear {
             x,
             weight,
@@ -167,7 +173,7 @@ pub(super) mod gradient {
                 let first = tape.linear(v[0], v[2], bias, relu)?;
                 let second = tape.linear(v[1], v[2], bias, relu)?;
                 let second = tape.reshape(second, &[2, outputs])?;
-                let (a, b) = (tape.sum(first), tape.square(second));
+                let (a, b) = (tape.sum(first)?, tape.square(second)?);
                 tape.add(a, b)
             })
         })

@@ -36,9 +36,16 @@ impl<T: Real> Tape<'_, T> {
     /// # Errors
     /// Shapes that do not broadcast together.
     pub fn mul(&mut self, a: Var, b: Var) -> Result<Var, AutogradError> {
-        let shape = broadcast_shape("mul", self.shape(a), self.shape(b))?;
-        let mut y = self.take(shape.iter().product());
-        zip_into(&mut y, &shape, self.array(a), self.array(b), |x, y| x * y);
+        self.own("mul", &[a, b])?;
+        let shape = broadcast_shape("mul", self.known().shape(a), self.known().shape(b))?;
+        let mut y = self.take_for("mul", &shape)?;
+        zip_into(
+            &mut y,
+            &shape,
+            self.known().array(a),
+            self.known().array(b),
+            |x, y| x * y,
+        );
         Ok(self.record("mul", &[a, b], &shape, y, || Mul {
             a,
             b,

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::autograd::{Backward, Operation, Real, Tape, Var};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Noise {
     x: Var,
@@ -25,18 +25,23 @@ impl<T: Real> Operation<T> for Noise {
 impl<T: Real> Tape<'_, T> {
     /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's
     /// dropout; `x` itself where dropout is off.
-    pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
-        let Some((key, deviation)) = self.next_draws(deviation) else {
-            return x;
+    ///
+    /// # Errors
+    /// A deviation below 0 or without an end; a value of another tape.
+    pub fn noise(&mut self, x: Var, deviation: f64) -> Result<Var, AutogradError> {
+        self.own("noise", &[x])?;
+        let valid = deviation >= 0.0 && deviation.is_finite();
+        AutogradError::unless(valid, "noise", ("deviation", deviation), "0 or more")?;
+        let Some((key, deviation)) = self.next_key(deviation) else {
+            return Ok(x);
         };
-        let shape = self.shape(x).to_vec();
-        let mut y = self.take(self.values(x).len());
+        let (shape, mut y) = self.copy(x);
         let mut rng = ChaCha8Rng::seed_from_u64(key);
-        for (y, &x) in y.iter_mut().zip(self.values(x)) {
+        for y in &mut y {
             let drawn: f64 = StandardNormal.sample(&mut rng);
-            *y = x + T::from_f64(deviation * drawn);
+            *y += T::from_f64(deviation * drawn);
         }
-        self.record("noise", &[x], &shape, y, || Noise { x })
+        Ok(self.record("noise", &[x], &shape, y, || Noise { x }))
     }
 }
 
@@ -48,7 +53,7 @@ pub(super) mod gradient {
         drawn((shapes(), 0.0..2.0), |(x, deviation), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
                 tape.set_dropout(Some(seed));
-                Ok(tape.noise(v[0], deviation))
+                tape.noise(v[0], deviation)
             })
         })
     }

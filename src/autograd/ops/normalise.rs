@@ -6,6 +6,7 @@
 //! ```
 
 use super::argument_error;
+use super::vector_norm::smoothing;
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
@@ -41,17 +42,16 @@ impl<T: Real> Tape<'_, T> {
     /// (above 0) keeps the gradient finite at 0.
     ///
     /// # Errors
-    /// A last axis that is no multiple of `width`.
+    /// A last axis that is no multiple of `width`; an `eps` that is not above 0.
     pub fn normalise(&mut self, x: Var, width: usize, eps: f64) -> Result<Var, AutogradError> {
-        let shape = self.shape(x).to_vec();
+        self.own("normalise", &[x])?;
+        let (shape, mut y) = self.copy(x);
         if width == 0 || !shape.last().is_some_and(|last| last.is_multiple_of(width)) {
             let argument = format!("vectors of {width} numbers");
             let expected = "a last axis that is a multiple of the vectors' width";
             return Err(argument_error("normalise", &shape, argument, expected));
         }
-        let eps = T::from_f64(eps);
-        let mut y = self.take(self.values(x).len());
-        y.copy_from_slice(self.values(x));
+        let eps = smoothing("normalise", eps)?;
         for vector in y.chunks_exact_mut(width) {
             let n = length(vector, eps);
             vector.iter_mut().for_each(|x| *x /= n);

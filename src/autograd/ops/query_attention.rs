@@ -22,6 +22,8 @@ use crate::autograd::kernels::{Mat, MatMut, WindowRows, dropped_into, vectorised
 use crate::autograd::reduce::sum_with;
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
+const NAME: &str = "query_attention";
+
 /// The projections of keys and values, one weight a head.
 #[derive(Debug, Clone)]
 pub struct QueryAttentionWeights {
@@ -192,7 +194,7 @@ impl<T: Real> Tape<'_, T> {
     /// and values and then [`Tape::attention`].
     ///
     /// # Errors
-    /// Shapes that do not fit.
+    /// Shapes that do not fit, a probability that is none.
     pub fn query_attention(
         &mut self,
         q: Var,
@@ -201,7 +203,12 @@ impl<T: Real> Tape<'_, T> {
         tokens: usize,
         p: f64,
     ) -> Result<Var, AutogradError> {
+        let mut inputs = vec![q, x, weights.value_bias];
+        inputs.extend_from_slice(&weights.keys);
+        inputs.extend_from_slice(&weights.values);
+        self.own(NAME, &inputs)?;
         let sizes = self.query_attention_sizes(q, x, &weights, tokens)?;
+        let dropout = self.next_draws(NAME, p)?;
         let shape = sizes.shape();
         let Sizes {
             batch,
@@ -217,10 +224,9 @@ impl<T: Real> Tape<'_, T> {
         let mut m = self.take(batch * heads * padded);
         let mut y = self.take(batch * all);
         let mut scratch = self.take(shape.scratch_len());
-        let dropout = self.next_draws(p);
-        let (known, rows) = (self.known(), sizes.rows(self.values(x)));
+        let (known, rows) = (self.known(), sizes.rows(self.known().values(x)));
         for (h, &weight) in weights.keys.iter().enumerate() {
-            let q_h = Mat::new(self.values(q), batch, all).columns(sizes.head(h));
+            let q_h = Mat::new(self.known().values(q), batch, all).columns(sizes.head(h));
             let u = MatMut::new(&mut u, batch, heads * width);
             known.product(q_h, weight, u.columns(sizes.tokens_of_head(h)), false);
         }
@@ -237,7 +243,7 @@ impl<T: Real> Tape<'_, T> {
             rows,
         };
         sums.put(&mut z, (0, width), shape, false, &mut scratch);
-        let bias = self.values(weights.value_bias);
+        let bias = self.known().values(weights.value_bias);
         for (row, y) in y.chunks_exact_mut(dh).enumerate() {
             let sum: T = m[row * padded..(row + 1) * padded].iter().copied().sum();
             let bias = &bias[sizes.head(row % heads)];
@@ -249,9 +255,6 @@ impl<T: Real> Tape<'_, T> {
             known.product_transposed(z_h, weight, y.columns(sizes.head(h)), true);
         }
         self.give(scratch);
-        let mut inputs = vec![q, x, weights.value_bias];
-        inputs.extend_from_slice(&weights.keys);
-        inputs.extend_from_slice(&weights.values);
         if !self.is_recording() {
             for buffer in [&mut u, &mut attention, &mut m, &mut z] {
                 self.give(std::mem::take(buffer));
@@ -268,7 +271,7 @@ impl<T: Real> Tape<'_, T> {
             m,
             z,
         };
-        Ok(self.record("query_attention", &inputs, &[batch, all], y, operation))
+        Ok(self.record(NAME, &inputs, &[batch, all], y, operation))
     }
 
     fn query_attention_sizes(
@@ -278,11 +281,10 @@ impl<T: Real> Tape<'_, T> {
         weights: &QueryAttentionWeights,
         tokens: usize,
     ) -> Result<Sizes, AutogradError> {
-        const NAME: &str = "query_attention";
-        let (left, right) = (self.shape(q), self.shape(x));
+        let (left, right) = (self.known().shape(q), self.known().shape(x));
         let (batch, all, width) = match (left, right) {
             (&[batch, all], &[rows, width])
-                if tokens > 0 && rows == batch * tokens && width > 0 =>
+                if tokens > 0 && width > 0 && batch.checked_mul(tokens) == Some(rows) =>
             {
                 (batch, all, width)
             }
@@ -295,23 +297,32 @@ impl<T: Real> Tape<'_, T> {
         if heads == 0 || weights.values.len() != heads || all == 0 || all % heads != 0 {
             let argument = format!("{heads} heads");
             let expected = "as many W_k as W_v, a number that divides the queries' width";
-            return Err(argument_error(NAME, self.shape(q), argument, expected));
+            return Err(argument_error(
+                NAME,
+                self.known().shape(q),
+                argument,
+                expected,
+            ));
         }
         let head_width = all / heads;
         for &weight in weights.keys.iter().chain(&weights.values) {
-            if self.shape(weight) != [head_width, width] {
-                let (left, right) = (self.shape(x), self.shape(weight));
+            if self.known().shape(weight) != [head_width, width] {
+                let (left, right) = (self.known().shape(x), self.known().shape(weight));
                 let expected = "x [B * n, d'] and weights [d / heads, d']";
                 return Err(shapes_error(NAME, left, right, expected));
             }
         }
-        if self.shape(weights.value_bias) != [all] {
-            let (left, right) = (self.shape(q), self.shape(weights.value_bias));
+        if self.known().shape(weights.value_bias) != [all] {
+            let (left, right) = (
+                self.known().shape(q),
+                self.known().shape(weights.value_bias),
+            );
             return Err(shapes_error(NAME, left, right, "q [B, d] and bias [d]"));
         }
         Ok(Sizes {
             batch,
-            tokens,
+            // Without a window none is long, whatever is asked for.
+            tokens: if batch == 0 { 1 } else { tokens },
             heads,
             head_width,
             width,
@@ -342,7 +353,7 @@ pub(super) mod gradient {
                     values: vec![v[4], v[5]],
                     value_bias: v[6],
                 };
-                let queries = tape.affine(v[0], strength, 0.0);
+                let queries = tape.affine(v[0], strength, 0.0)?;
                 tape.query_attention(queries, v[1], weights, tokens, 0.3)
             })
         })

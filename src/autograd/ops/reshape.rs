@@ -25,12 +25,19 @@ impl<T: Real> Tape<'_, T> {
     /// # Errors
     /// A shape with another number of numbers.
     pub fn reshape(&mut self, x: Var, shape: &[usize]) -> Result<Var, AutogradError> {
-        if shape.iter().product::<usize>() != self.values(x).len() {
+        self.own("reshape", &[x])?;
+        let numbers = shape.iter().try_fold(1, |n: usize, &k| n.checked_mul(k));
+        if numbers != Some(self.known().values(x).len()) {
             let expected = "as many numbers on both sides";
-            return Err(shapes_error("reshape", self.shape(x), shape, expected));
+            return Err(shapes_error(
+                "reshape",
+                self.known().shape(x),
+                shape,
+                expected,
+            ));
         }
-        let mut y = self.take(self.values(x).len());
-        y.copy_from_slice(self.values(x));
+        let mut y = self.take_for("reshape", shape)?;
+        y.copy_from_slice(self.known().values(x));
         Ok(self.record("reshape", &[x], shape, y, || Reshape { x }))
     }
 }

@@ -21,7 +21,8 @@ impl<T: Real> Tape<'_, T> {
     /// probability `p` on the attention weights.
     ///
     /// # Errors
-    /// Rows that are no whole windows, queries that are not some heads of c columns for each token.
+    /// Rows that are no whole windows, queries that are not some heads of c columns for each token,
+    /// a probability that is none.
     pub fn shared_attention(
         &mut self,
         q: Var,
@@ -30,7 +31,8 @@ impl<T: Real> Tape<'_, T> {
         scale: f64,
         p: f64,
     ) -> Result<Var, AutogradError> {
-        let (left, right) = (self.shape(q), self.shape(x));
+        self.own("shared_attention", &[q, x])?;
+        let (left, right) = (self.known().shape(q), self.known().shape(x));
         let (&[rows, all], &[others, width]) = (left, right) else {
             let expected = "q [rows, heads * c] and x [rows, c]";
             return Err(shapes_error("shared_attention", left, right, expected));
@@ -43,7 +45,7 @@ impl<T: Real> Tape<'_, T> {
         let shape = AttentionShape {
             heads: 1,
             width,
-            queries: tokens * (all / width),
+            queries: tokens.saturating_mul(all / width),
             keys: tokens,
         };
         let operand = |value| Operand {
@@ -57,7 +59,7 @@ impl<T: Real> Tape<'_, T> {
             bias: None,
             shape,
             scale,
-            dropout: self.next_draws(p),
+            dropout: self.next_draws("shared_attention", p)?,
             probabilities: Vec::new(),
         };
         Ok(attention.record(self, "shared_attention", &[rows, all]))

@@ -6,7 +6,7 @@
 //! ```
 
 use crate::autograd::reduce::sum_with;
-use crate::autograd::{Backward, Operation, Real, Tape, Var};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Softmax {
     x: Var,
@@ -37,18 +37,20 @@ fn shift<T: Real>(row: &mut [T]) {
 
 impl<T: Real> Tape<'_, T> {
     /// Softmax of each row of `x [.., n]`.
-    pub fn softmax(&mut self, x: Var) -> Var {
-        let shape = self.shape(x).to_vec();
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn softmax(&mut self, x: Var) -> Result<Var, AutogradError> {
+        self.own("softmax", &[x])?;
         let columns = self.rows_and_columns(x).1.max(1);
-        let mut y = self.take(self.values(x).len());
-        y.copy_from_slice(self.values(x));
+        let (shape, mut y) = self.copy(x);
         y.chunks_exact_mut(columns).for_each(shift);
         T::exp_slice(&mut y);
         for row in y.chunks_exact_mut(columns) {
             let scale = T::one() / sum_with(row.len(), |j| row[j]);
             row.iter_mut().for_each(|x| *x *= scale);
         }
-        self.record("softmax", &[x], &shape, y, || Softmax { x, columns })
+        Ok(self.record("softmax", &[x], &shape, y, || Softmax { x, columns }))
     }
 }
 
@@ -59,8 +61,8 @@ pub(super) mod gradient {
     pub fn cases() -> Cases {
         drawn((shapes(), strength()), |(x, strength), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
-                let logits = tape.affine(v[0], strength, 0.0);
-                Ok(tape.softmax(logits))
+                let logits = tape.affine(v[0], strength, 0.0)?;
+                tape.softmax(logits)
             })
         })
     }

@@ -5,11 +5,14 @@
 //! ```
 
 use super::unary::unary;
-use crate::autograd::{Real, Tape, Var};
+use crate::autograd::{AutogradError, Real, Tape, Var};
 
 impl<T: Real> Tape<'_, T> {
     /// sqrt(x) for x > 0, elementwise.
-    pub fn sqrt(&mut self, x: Var) -> Var {
+    ///
+    /// # Errors
+    /// A value of another tape.
+    pub fn sqrt(&mut self, x: Var) -> Result<Var, AutogradError> {
         unary(
             self,
             "sqrt",
@@ -27,9 +30,9 @@ pub(super) mod gradient {
     pub fn cases() -> Cases {
         drawn(shapes(), |x, seed| {
             case(&[&x], seed, 0.0, |tape, v| {
-                let square = tape.square(v[0]);
-                let shift = tape.affine(square, 1.0, 0.3);
-                Ok(tape.sqrt(shift))
+                let square = tape.square(v[0])?;
+                let shift = tape.affine(square, 1.0, 0.3)?;
+                tape.sqrt(shift)
             })
         })
     }

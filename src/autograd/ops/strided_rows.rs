@@ -19,7 +19,8 @@ impl<T: Real> Tape<'_, T> {
         start: usize,
         step: usize,
     ) -> Result<Var, AutogradError> {
-        let mut shape = self.shape(x).to_vec();
+        self.own("strided_rows", &[x])?;
+        let mut shape = self.known().shape(x).to_vec();
         let rows = shape.first().copied().unwrap_or(0);
         if shape.is_empty() || start >= step || rows % step != 0 {
             let argument = format!("rows from {start} in steps of {step}");
@@ -28,8 +29,9 @@ impl<T: Real> Tape<'_, T> {
         }
         let width: usize = shape.iter().skip(1).product();
         shape[0] = rows / step;
-        // The rows of a step beside each other.
-        let (numbers, all) = (start * width..(start + 1) * width, step * width);
+        // The rows of a step beside each other; without any row the step may be of any size.
+        let at = |row: usize| row.saturating_mul(width);
+        let (numbers, all) = (at(start)..at(start + 1), at(step));
         Ok(columns_of(self, "strided_rows", x, (numbers, all), &shape))
     }
 }

@@ -1,6 +1,6 @@
 //! What the elementwise functions of one value share.
 
-use crate::autograd::{Backward, Operation, Real, Tape, Var};
+use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
 
 struct Unary<D> {
     x: Var,
@@ -23,10 +23,9 @@ pub(super) fn unary<T: Real>(
     x: Var,
     forward: impl Fn(&mut [T]),
     derivative: impl Fn(T, T) -> T + Send + 'static,
-) -> Var {
-    let shape = tape.shape(x).to_vec();
-    let mut y = tape.take(tape.values(x).len());
-    y.copy_from_slice(tape.values(x));
+) -> Result<Var, AutogradError> {
+    tape.own(name, &[x])?;
+    let (shape, mut y) = tape.copy(x);
     forward(&mut y);
-    tape.record(name, &[x], &shape, y, || Unary { x, derivative })
+    Ok(tape.record(name, &[x], &shape, y, || Unary { x, derivative }))
 }

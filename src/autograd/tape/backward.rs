@@ -13,11 +13,15 @@ use crate::autograd::workspace::Workspace;
 impl<T: Real> Tape<'_, T> {
     /// Runs the tape backwards from a scalar (a value of one number) and adds the gradients of all
     /// parameters to `gradients`.
+    ///
+    /// # Errors
+    /// A loss of several numbers; otherwise as [`Tape::backward_from`].
     pub fn backward(self, loss: Var, gradients: &mut Gradients<T>) -> Result<(), AutogradError> {
-        if self.values(loss).len() != 1 {
+        self.own("backward", &[loss])?;
+        if self.known().values(loss).len() != 1 {
             return Err(AutogradError::Argument {
                 operation: "backward",
-                shape: self.shape(loss).to_vec(),
+                shape: self.known().shape(loss).to_vec(),
                 argument: "the loss".into(),
                 expected: "one number",
             });
@@ -31,7 +35,8 @@ impl<T: Real> Tape<'_, T> {
     /// (values made by [`Tape::input`]), in their order.
     ///
     /// # Errors
-    /// An upstream gradient of another length than the output; an input that is no value of
+    /// A tape that does not record; an output of another tape; gradients of other parameters; an
+    /// upstream gradient of another length than the output; an input that is no value of
     /// [`Tape::input`] on this tape; where the tape traces, a gradient that is not finite.
     pub fn backward_from(
         mut self,
@@ -40,25 +45,7 @@ impl<T: Real> Tape<'_, T> {
         inputs: &[Var],
         gradients: &mut Gradients<T>,
     ) -> Result<Vec<ArrayD<T>>, AutogradError> {
-        let unfit = |shape: &[usize], argument: String, expected| AutogradError::Argument {
-            operation: "backward_from",
-            shape: shape.to_vec(),
-            argument,
-            expected,
-        };
-        let shape = self.shape(output);
-        if upstream.len() != shape.iter().product::<usize>() {
-            let argument = format!("an upstream gradient of {} numbers", upstream.len());
-            return Err(unfit(shape, argument, "one for each number of the output"));
-        }
-        for (place, input) in inputs.iter().enumerate() {
-            let node = self.nodes.get(input.index());
-            if node.is_none_or(|node| node.name != INPUT) {
-                let shape = node.map_or(&[][..], |_| self.shape(*input));
-                let expected = "a value of Tape::input on this tape";
-                return Err(unfit(shape, format!("input {place}"), expected));
-            }
-        }
+        self.check_backward(output, upstream, inputs, gradients)?;
         let lists = self.workspace.lists();
         let mut slots = std::mem::take(&mut lists.slots);
         slots.resize_with(self.nodes.len(), || None);
@@ -81,10 +68,10 @@ impl<T: Real> Tape<'_, T> {
                 slots: &mut slots,
                 stagings: &mut stagings,
                 gradients,
-                output: Var(index as u32),
+                output: index,
                 staged: !self.trace,
             };
-            context.flush_staging(Var(index as u32));
+            context.flush_staging(index);
             if let Some(mut operation) = operation {
                 if let Some(mut dy) = context.slots[index].take() {
                     if self.trace
@@ -109,7 +96,7 @@ impl<T: Real> Tape<'_, T> {
                 operation.release(self.workspace);
             }
             if inputs.iter().any(|input| input.index() == index) {
-                let shape = self.shape(Var(index as u32)).to_vec();
+                let shape = self.nodes[index].shape(self.parameters).to_vec();
                 let gradient = slots[index]
                     .take()
                     .unwrap_or_else(|| vec![T::zero(); shape.iter().product()]);
@@ -135,6 +122,44 @@ impl<T: Real> Tape<'_, T> {
         (lists.slots, lists.stagings) = (slots, stagings);
         found.sort_by_key(|(k, _)| *k);
         Ok(found.into_iter().map(|(_, gradient)| gradient).collect())
+    }
+
+    /// Refuses what [`Tape::backward_from`] cannot run backwards.
+    fn check_backward(
+        &self,
+        output: Var,
+        upstream: &[T],
+        inputs: &[Var],
+        gradients: &Gradients<T>,
+    ) -> Result<(), AutogradError> {
+        let operation = "backward_from";
+        self.own(operation, &[output])?;
+        self.own(operation, inputs)?;
+        if !self.recording || !gradients.fit(self.parameters) {
+            let what = match self.recording {
+                true => "the gradients are those of other parameters than the tape's",
+                false => "the tape does not record",
+            };
+            return Err(AutogradError::Misplaced { operation, what });
+        }
+        let unfit = |var, argument, expected| AutogradError::Argument {
+            operation,
+            shape: self.known().shape(var).to_vec(),
+            argument,
+            expected,
+        };
+        if upstream.len() != self.known().values(output).len() {
+            let argument = format!("an upstream gradient of {} numbers", upstream.len());
+            return Err(unfit(output, argument, "one for each number of the output"));
+        }
+        let mut places = inputs.iter().enumerate();
+        match places.find(|(_, input)| self.nodes[input.index()].name != INPUT) {
+            Some((place, &input)) => {
+                let expected = "a value of Tape::input";
+                Err(unfit(input, format!("input {place}"), expected))
+            }
+            None => Ok(()),
+        }
     }
 }
 
@@ -198,7 +223,8 @@ pub struct Backward<'s, T: Real> {
     slots: &'s mut [Option<Vec<T>>],
     stagings: &'s mut [Option<Staging<T>>],
     gradients: &'s mut Gradients<T>,
-    output: Var,
+    /// The place of the operation's own output.
+    output: usize,
     /// Whether rows for a weight's gradient are collected; not where each operation's share in it
     /// is looked at.
     staged: bool,
@@ -221,7 +247,7 @@ impl<'s, T: Real> Backward<'s, T> {
 
     /// The operation's own output.
     pub fn output(&self) -> &'s [T] {
-        self.values(self.output)
+        self.known.values_at(self.output)
     }
 
     pub(in crate::autograd) fn known(&self) -> Known<'s, T> {
@@ -242,7 +268,11 @@ impl<'s, T: Real> Backward<'s, T> {
 
     /// Where to add the gradient of an input, if it wants one.
     pub fn target(&mut self, var: Var) -> Option<Target<'_, T>> {
-        let node = &self.known.nodes[var.index()];
+        self.target_at(var.index())
+    }
+
+    fn target_at(&mut self, index: usize) -> Option<Target<'_, T>> {
+        let node = &self.known.nodes[index];
         if !node.needs_gradient {
             return None;
         }
@@ -252,7 +282,7 @@ impl<'s, T: Real> Backward<'s, T> {
                 fresh: false,
             }),
             Value::Array(array) => {
-                let slot = &mut self.slots[var.index()];
+                let slot = &mut self.slots[index];
                 let fresh = slot.is_none();
                 let data = slot.get_or_insert_with(|| self.workspace.take(array.len()));
                 Some(Target { data, fresh })
@@ -281,13 +311,13 @@ impl<'s, T: Real> Backward<'s, T> {
             self.stagings[weight.index()].get_or_insert_with(|| Staging::new(dy.cols, x.cols));
         staging.push(dy, x, self.workspace);
         if staging.is_full() {
-            self.flush_staging(weight);
+            self.flush_staging(weight.index());
         }
     }
 
-    fn flush_staging(&mut self, weight: Var) {
-        if let Some(staging) = self.stagings[weight.index()].take() {
-            if let Some(target) = self.target(weight) {
+    fn flush_staging(&mut self, weight: usize) {
+        if let Some(staging) = self.stagings[weight].take() {
+            if let Some(target) = self.target_at(weight) {
                 staging.product_into(target.data, !target.fresh);
             }
             staging.release(self.workspace);

@@ -21,16 +21,16 @@ impl<T: Real> Clone for Known<'_, T> {
 impl<T: Real> Copy for Known<'_, T> {}
 
 impl<'s, T: Real> Known<'s, T> {
-    pub(super) fn shape(self, var: Var) -> &'s [usize] {
-        match &self.nodes[var.index()].value {
-            Value::Array(array) => array.shape(),
-            Value::Block(id) => self.parameters.block_shape(*id),
-            Value::Released => &[],
-        }
+    pub(in crate::autograd) fn shape(self, var: Var) -> &'s [usize] {
+        self.nodes[var.index()].shape(self.parameters)
     }
 
-    pub(super) fn values(self, var: Var) -> &'s [T] {
-        match &self.nodes[var.index()].value {
+    pub(in crate::autograd) fn values(self, var: Var) -> &'s [T] {
+        self.values_at(var.index())
+    }
+
+    pub(super) fn values_at(self, index: usize) -> &'s [T] {
+        match &self.nodes[index].value {
             // Every array on the tape is in standard layout.
             Value::Array(array) => array.as_slice().unwrap_or(&[]),
             Value::Block(id) => self.parameters.block_values(*id),
@@ -38,7 +38,7 @@ impl<'s, T: Real> Known<'s, T> {
         }
     }
 
-    pub(super) fn array(self, var: Var) -> ArrayViewD<'s, T> {
+    pub(in crate::autograd) fn array(self, var: Var) -> ArrayViewD<'s, T> {
         ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
             .expect("a value has as many numbers as its shape says")
     }

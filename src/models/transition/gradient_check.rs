@@ -165,7 +165,7 @@ pub fn check_model(
     if network.forcing(case.forcing) != case.forcing {
         return Ok(None);
     }
-    for (_, value) in parameters.values_mut() {
+    for (_, mut value) in parameters.values_mut() {
         value.mapv_inplace(|x| x + rng.random_range(-NOISE..NOISE));
     }
     let key = case.dropout.then_some(DROPOUT_KEY);
@@ -184,10 +184,11 @@ pub fn check_model(
             let mut tape = Tape::inference(parameters, &mut workspace);
             tape.set_dropout(key);
             let losses = network.losses(&mut tape, &batch, case.forcing)?;
-            let total = tape.values(losses.total)[0];
-            let critics = losses
-                .critics
-                .map_or(0.0, |critics| tape.values(critics)[0]);
+            let total = tape.values(losses.total)?[0];
+            let critics = match losses.critics {
+                Some(critics) => tape.values(critics)?[0],
+                None => 0.0,
+            };
             Ok(match name.starts_with(CRITICS) {
                 true => critics,
                 false => total - critics,

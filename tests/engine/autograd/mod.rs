@@ -4,5 +4,6 @@ mod errors;
 mod extremes;
 mod fused;
 mod kernels;
+mod misuse;
 mod tape;
 mod weights;
