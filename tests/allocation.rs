@@ -86,14 +86,14 @@ fn steps(config: &Pan2021Config, forcing: Forcing, windows: &[usize]) -> Vec<Ste
         })
         .collect();
     let mut workspace = Workspace::new();
-    let mut gradients = [Gradients::zeros(&parameters)];
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
+    let mut gradients = Gradients::zeros(&parameters);
+    let mut adam = Adam::new(AdamConfig::default(), &parameters).unwrap();
     let steps = batches.iter().enumerate().map(|(step, batch)| {
         let before = LARGE_BYTES.load(Ordering::Relaxed);
         let mut tape = Tape::recording(&parameters, &mut workspace).with_dropout(step as u64);
         let total = network.losses(&mut tape, batch, forcing).unwrap().total;
-        tape.backward(total, &mut gradients[0]).unwrap();
-        adam.step(&mut parameters, &mut gradients, 1e-4).unwrap();
+        tape.backward(total, &mut gradients).unwrap();
+        adam.step(&mut parameters, &mut gradients).unwrap();
         Step {
             large_bytes: LARGE_BYTES.load(Ordering::Relaxed) - before,
             held: workspace.held(),

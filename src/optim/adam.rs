@@ -47,6 +47,14 @@ pub struct AdamConfig {
 }
 
 impl AdamConfig {
+    /// The defaults at this learning rate.
+    pub fn with_rate(learning_rate: f64) -> Self {
+        Self {
+            learning_rate,
+            ..Self::default()
+        }
+    }
+
     /// The learning rate at a step, counted from 0, of a training of `steps` steps.
     pub fn learning_rate_at(&self, step: u64, steps: u64) -> f64 {
         match self.rate_schedule {
@@ -141,10 +149,27 @@ pub enum AdamError {
 }
 
 /// The optimiser's state: two moments for every weight, and the number of steps.
+///
+/// ```
+/// use keydance::autograd::{Gradients, Parameters};
+/// use keydance::optim::{Adam, AdamConfig};
+///
+/// let mut parameters = Parameters::<f64>::new();
+/// parameters.add("weight", ndarray::arr1(&[1.0]).into_dyn());
+/// let mut adam = Adam::new(AdamConfig::with_rate(0.1), &parameters)?;
+/// let mut gradients = Gradients::zeros(&parameters);
+/// gradients.iter_mut().for_each(|of_weight| of_weight.fill(2.0));
+/// adam.step(&mut parameters, &mut gradients)?;
+/// let (_, weight) = parameters.iter().next().unwrap();
+/// assert!((weight[[0]] - 0.9).abs() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adam<T> {
     config: AdamConfig,
     steps: u64,
+    /// Steps of the whole training.
+    planned: u64,
     /// The rate of each parameter over the learning rate.
     shares: Vec<f64>,
     /// m and v of each parameter, in its layout.
@@ -165,16 +190,11 @@ struct Factors<T> {
 }
 
 impl<T: Real> Adam<T> {
-    /// Moments of zero for every parameter. `rate_group` says of a parameter's name which of
-    /// [`AdamConfig::rates`] is its own.
+    /// Moments of zero for every parameter, all at the config's rate.
     ///
     /// # Errors
     /// A setting out of its range.
-    pub fn new<'g>(
-        config: AdamConfig,
-        parameters: &Parameters<T>,
-        rate_group: impl Fn(&str) -> Option<&'g str>,
-    ) -> Result<Self, SettingError> {
+    pub fn new(config: AdamConfig, parameters: &Parameters<T>) -> Result<Self, SettingError> {
         config.check()?;
         let zeros = || -> Vec<Vec<T>> {
             parameters
@@ -182,15 +202,42 @@ impl<T: Real> Adam<T> {
                 .map(|(_, value)| vec![T::zero(); value.len()])
                 .collect()
         };
-        let share = |name: &str| config.share_of(rate_group(name));
-        let shares = parameters.iter().map(|(name, _)| share(name)).collect();
         Ok(Self {
             config,
             steps: 0,
-            shares,
+            planned: u64::MAX,
+            shares: vec![1.0; parameters.len()],
             first: zeros(),
             second: zeros(),
         })
+    }
+
+    /// The same with groups of weights at rates of their own: `rate_group` says of the name of each
+    /// of the `parameters` which of [`AdamConfig::rates`] it has, if any.
+    #[must_use]
+    pub fn with_rate_groups<'g>(
+        mut self,
+        parameters: &Parameters<T>,
+        rate_group: impl Fn(&str) -> Option<&'g str>,
+    ) -> Self {
+        let shares = self.shares.iter_mut().zip(parameters.iter());
+        for (share, (name, _)) in shares {
+            *share = self.config.share_of(rate_group(name));
+        }
+        self
+    }
+
+    /// The same for a training of this many steps, over which [`AdamConfig::rate_schedule`] changes
+    /// the rate; without it the rate stays where the warm-up leaves it.
+    #[must_use]
+    pub fn for_steps(mut self, steps: u64) -> Self {
+        self.planned = steps;
+        self
+    }
+
+    /// The learning rate of the next step.
+    pub fn learning_rate(&self) -> f64 {
+        self.config.learning_rate_at(self.steps, self.planned)
     }
 
     /// Steps done.
@@ -219,20 +266,32 @@ impl<T: Real> Adam<T> {
         Ok(())
     }
 
-    /// One step at `learning_rate` with the sum of the shards' gradients, added in their order;
-    /// leaves every gradient at zero. Returns the norm of the sum over all parameters. Runs on
-    /// rayon's current pool; the result does not depend on its threads.
+    /// One step, see [`Adam::step_shards`].
     ///
     /// # Errors
-    /// A gradient that is not finite, a learning rate that is no number from 0, weights or
-    /// gradients of other parameters; then no weight, no moment is changed, and the gradients are
-    /// undefined.
+    /// As [`Adam::step_shards`].
     pub fn step(
         &mut self,
         parameters: &mut Parameters<T>,
-        shards: &mut [Gradients<T>],
-        learning_rate: f64,
+        gradients: &mut Gradients<T>,
     ) -> Result<f64, AdamError> {
+        self.step_shards(parameters, std::slice::from_mut(gradients))
+    }
+
+    /// One step with the sum of the shards' gradients, added in their order; leaves every gradient
+    /// at zero. Returns the norm of the sum over all parameters. Runs on rayon's current pool; the
+    /// result does not depend on its threads.
+    ///
+    /// # Errors
+    /// A gradient that is not finite, a rate that is beyond the weights' numbers, weights or
+    /// gradients of other parameters; then no weight, no moment is changed, and the gradients are
+    /// undefined.
+    pub fn step_shards(
+        &mut self,
+        parameters: &mut Parameters<T>,
+        shards: &mut [Gradients<T>],
+    ) -> Result<f64, AdamError> {
+        let learning_rate = self.learning_rate();
         let lengths = parameters.iter().map(|(_, value)| value.len());
         if !lengths.eq(self.first.iter().map(Vec::len))
             || !shards.iter().all(|shard| shard.fit(parameters))

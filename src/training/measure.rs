@@ -21,7 +21,6 @@ pub struct MeasuredStep {
     parameters: Parameters<f32>,
     adam: Adam<f32>,
     stepper: Stepper,
-    learning_rate: f64,
     done: u64,
 }
 
@@ -44,13 +43,11 @@ impl MeasuredStep {
             .made_up_task(frames, batch, streams, &mut init)?;
         Ok(Self {
             streams,
-            adam: Adam::new(config.optimiser.clone(), &parameters, |name| {
-                task.rate_group(name)
-            })?,
+            adam: Adam::new(config.optimiser.clone(), &parameters)?
+                .with_rate_groups(&parameters, |name| task.rate_group(name)),
             task,
             stepper: Stepper::new(threads)?,
             parameters,
-            learning_rate: config.optimiser.learning_rate,
             done: 0,
         })
     }
@@ -70,7 +67,6 @@ impl MeasuredStep {
             step: &*step,
             streams: self.streams,
             done: self.done,
-            learning_rate: self.learning_rate,
         };
         let start = Instant::now();
         self.stepper

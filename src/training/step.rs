@@ -17,7 +17,6 @@ pub struct StepInput<'s> {
     pub streams: Streams,
     /// Steps done before.
     pub done: u64,
-    pub learning_rate: f64,
 }
 
 /// Losses of a step or of a shard of it.
@@ -120,7 +119,7 @@ impl Stepper {
             }
             sum.buffers.extend(losses.buffers);
         }
-        let norm = pool.install(|| adam.step(parameters, gradients, input.learning_rate));
+        let norm = pool.install(|| adam.step_shards(parameters, gradients));
         match norm {
             Ok(norm) => {
                 take_up_buffers(parameters, &sum.buffers).map_err(|cause| failure(input, cause))?;

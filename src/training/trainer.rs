@@ -88,9 +88,9 @@ impl<'d> Trainer<'d> {
             config_toml: config.to_toml().map_err(RunError::from)?,
             dataset,
             streams,
-            adam: Adam::new(config.optimiser.clone(), &parameters, |name| {
-                task.rate_group(name)
-            })?,
+            adam: Adam::new(config.optimiser.clone(), &parameters)?
+                .with_rate_groups(&parameters, |name| task.rate_group(name))
+                .for_steps(task.steps()),
             task,
             parameters,
             stepper: Stepper::new(threads)?,
@@ -195,13 +195,11 @@ impl<'d> Trainer<'d> {
         let start = Instant::now();
         let done = self.steps_done();
         let step = self.task.step(done);
-        let optimiser = &self.config.optimiser;
-        let learning_rate = optimiser.learning_rate_at(done, self.task.steps());
+        let learning_rate = self.adam.learning_rate();
         let input = StepInput {
             step: &*step,
             streams: self.streams,
             done,
-            learning_rate,
         };
         let (stepper, adam) = (&mut self.stepper, &mut self.adam);
         let (losses, gradient_norm) = stepper.step(input, &mut self.parameters, adam)?;

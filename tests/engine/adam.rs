@@ -59,13 +59,12 @@ fn steps_follow_the_published_algorithm() {
     let gradient =
         |t: usize, i: usize| ((i * 7 + t * 13) as f64 * 0.11).cos() * 10f64.powi(i as i32 % 9 - 6);
     let mut parameters = parameters::<f64>(&[&start]);
-    let mut adam = Adam::new(config.clone(), &parameters, |_| None).unwrap();
+    let mut adam = Adam::new(config.clone(), &parameters).unwrap();
     for t in 0..20 {
         // Two shards that add up to the gradient.
         let shard = |share: f64| gradients(&parameters, |_, i| gradient(t, i) * share);
         let mut shards = [shard(0.25), shard(0.75)];
-        adam.step(&mut parameters, &mut shards, config.learning_rate)
-            .unwrap();
+        adam.step_shards(&mut parameters, &mut shards).unwrap();
         assert!(
             shards
                 .iter()
@@ -86,10 +85,10 @@ fn steps_follow_the_published_algorithm() {
 fn a_constant_gradient_moves_a_weight_by_the_learning_rate_a_step() {
     // With g constant both corrected moments are exact: every step is rate * g / (|g| + eps).
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0, 3.0]]);
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
+    let mut adam = Adam::new(AdamConfig::default(), &parameters).unwrap();
     for _ in 0..5 {
-        let gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
-        adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
+        let mut gradients = gradients(&parameters, |_, i| [3.0, -0.02, 1e-8][i]);
+        adam.step(&mut parameters, &mut gradients).unwrap();
     }
     let expected = [1.0 - 5e-4, 2.0 + 5e-4, 3.0 - 2.5e-4];
     for (w, expected) in weights(&parameters).into_iter().zip(expected) {
@@ -106,22 +105,30 @@ fn a_group_of_weights_has_a_rate_of_its_own() {
     };
     let start = [1.0, -2.0];
     let mut both = parameters::<f64>(&[&start, &start]);
-    let mut adam = Adam::new(config.clone(), &both, |name| {
-        (name == "p1").then_some("slow")
-    })
-    .unwrap();
-    // Half the rate of the config, as a schedule has it.
-    for t in 0..5 {
-        let gradients = gradients(&both, |_, i| (i + t) as f64 - 1.5);
-        adam.step(&mut both, &mut [gradients], 5e-4).unwrap();
-    }
+    // Half of the rates, once the schedule's warm-up has come so far.
+    let schedule = RateSchedule {
+        warmup_steps: 2,
+        ..RateSchedule::default()
+    };
+    let halved = AdamConfig {
+        rate_schedule: Some(schedule),
+        ..config.clone()
+    };
+    let mut adam = Adam::new(halved, &both)
+        .unwrap()
+        .with_rate_groups(&both, |name| (name == "p1").then_some("slow"));
+    assert_eq!(adam.learning_rate(), 5e-4);
+    let mut step = gradients(&both, |_, i| i as f64 - 1.5);
+    adam.step(&mut both, &mut step).unwrap();
     for (k, rate) in [5e-4, 1e-4].into_iter().enumerate() {
         let mut alone = parameters::<f64>(&[&start]);
-        let mut adam = Adam::new(config.clone(), &alone, |_| None).unwrap();
-        for t in 0..5 {
-            let gradients = gradients(&alone, |_, i| (i + t) as f64 - 1.5);
-            adam.step(&mut alone, &mut [gradients], rate).unwrap();
-        }
+        let config = AdamConfig {
+            learning_rate: rate,
+            ..AdamConfig::default()
+        };
+        let mut adam = Adam::new(config, &alone).unwrap();
+        let mut step = gradients(&alone, |_, i| i as f64 - 1.5);
+        adam.step(&mut alone, &mut step).unwrap();
         for (w, expected) in weights(&both)[2 * k..].iter().zip(weights(&alone)) {
             assert!((w - expected).abs() < 1e-12, "p{k}: {w} is not {expected}");
         }
@@ -141,9 +148,9 @@ fn a_long_gradient_is_scaled_to_the_limit_over_all_parameters() {
     };
     let run = |config, scale: f64| {
         let mut parameters = parameters::<f64>(&[&[0.0], &[0.0]]);
-        let mut adam = Adam::new(config, &parameters, |_| None).unwrap();
-        let gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
-        let norm = adam.step(&mut parameters, &mut [gradients], 1e-4).unwrap();
+        let mut adam = Adam::new(config, &parameters).unwrap();
+        let mut gradients = gradients(&parameters, |k, _| [3.0, 4.0][k] * scale);
+        let norm = adam.step(&mut parameters, &mut gradients).unwrap();
         (norm, weights(&parameters))
     };
     let (norm, long) = run(clipped.clone(), 1.0);
@@ -159,16 +166,14 @@ fn a_long_gradient_is_scaled_to_the_limit_over_all_parameters() {
 #[test]
 fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
+    let mut adam = Adam::new(AdamConfig::default(), &parameters).unwrap();
     let before = (weights(&parameters), adam.clone());
     for bad in [f64::NAN, f64::INFINITY] {
-        let gradients = gradients(
+        let mut gradients = gradients(
             &parameters,
             |k, i| if (k, i) == (1, 17) { bad } else { 1e30 },
         );
-        let error = adam
-            .step(&mut parameters, &mut [gradients], 1e-4)
-            .unwrap_err();
+        let error = adam.step(&mut parameters, &mut gradients).unwrap_err();
         let expected = AdamError::NonFinite {
             parameter: "p1".into(),
             shape: vec![20],
@@ -181,15 +186,18 @@ fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
 #[test]
 fn a_learning_rate_that_is_none_or_gradients_of_other_parameters_change_nothing() {
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
-    let mut adam = Adam::new(AdamConfig::default(), &parameters, |_| None).unwrap();
+    let mut adam = Adam::new(AdamConfig::default(), &parameters).unwrap();
     let before = (weights(&parameters), adam.clone());
-    for rate in [f64::NAN, -1e-4, f64::INFINITY, 1e300] {
-        let gradients = gradients(&parameters, |_, _| 1.0);
-        let error = adam
-            .step(&mut parameters, &mut [gradients], rate)
-            .unwrap_err();
-        assert!(error.to_string().contains("learning rate"), "{error}");
-    }
+    let config = AdamConfig {
+        learning_rate: 1e300,
+        ..AdamConfig::default()
+    };
+    let mut ones = gradients(&parameters, |_, _| 1.0);
+    let step = Adam::new(config, &parameters)
+        .unwrap()
+        .step(&mut parameters, &mut ones);
+    let error = step.unwrap_err().to_string();
+    assert!(error.contains("learning rate"), "{error}");
     let mut others: Vec<Parameters<f32>> = vec![Parameters::new()];
     for sizes in [vec![2], vec![2, 19], vec![20, 2], vec![2, 20, 1]] {
         let values: Vec<Vec<f64>> = sizes.iter().map(|&size| vec![0.0; size]).collect();
@@ -198,12 +206,12 @@ fn a_learning_rate_that_is_none_or_gradients_of_other_parameters_change_nothing(
     }
     for mut other in others {
         let own = gradients(&parameters, |_, _| 1.0);
-        let of_other = gradients(&other, |_, _| 1.0);
+        let mut of_other = gradients(&other, |_, _| 1.0);
         let refused = |error| assert_eq!(error, Err(AdamError::OtherParameters));
-        refused(adam.step(&mut parameters, &mut [of_other.clone()], 1e-4));
+        refused(adam.step(&mut parameters, &mut of_other));
         // The first shard fits, one after it does not.
-        refused(adam.step(&mut parameters, &mut [own, of_other.clone()], 1e-4));
-        refused(adam.step(&mut other, &mut [of_other], 1e-4));
+        refused(adam.step_shards(&mut parameters, &mut [own, of_other.clone()]));
+        refused(adam.step(&mut other, &mut of_other));
     }
     assert_eq!((weights(&parameters), adam), before);
 }
@@ -273,7 +281,7 @@ fn settings_out_of_their_range_make_no_optimiser() {
             },
         ),
     ] {
-        let error = Adam::new(config, &parameters, |_| None).unwrap_err();
+        let error = Adam::new(config, &parameters).unwrap_err();
         assert_eq!(error.key, key);
     }
 }
@@ -293,14 +301,13 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
                 ..AdamConfig::default()
             },
             &parameters,
-            |_| None,
         )
         .unwrap();
         for t in 0..3 {
             let mut shards: Vec<_> = (0..4)
                 .map(|s| gradients(&parameters, |_, i| ((i + s * 31 + t) as f64).cos()))
                 .collect();
-            pool.install(|| adam.step(&mut parameters, &mut shards, 1e-4))
+            pool.install(|| adam.step_shards(&mut parameters, &mut shards))
                 .unwrap();
         }
         weights(&parameters)
