@@ -193,5 +193,5 @@ fn set_number(
 
 #[cfg(test)]
 mod mutations;
-#[cfg(test)]
-pub(super) mod property;
+#[cfg(any(test, feature = "proptest"))]
+pub mod property;

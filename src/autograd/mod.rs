@@ -21,6 +21,6 @@ mod workspace;
 pub use error::AutogradError;
 pub use kernels::Real;
 pub use parameters::{BlockId, BufferId, Gradients, ParameterId, Parameters};
-pub(crate) use tape::{Backward, Operation, Target};
+pub use tape::{Backward, Operation, Target};
 pub use tape::{Tape, Var};
 pub use workspace::Workspace;

@@ -51,6 +51,14 @@ struct Block<T> {
 
 /// Named weights, and named buffers: state that is saved with them and that no gradient moves, such
 /// as running means. Shared read-only by the tapes of a step; changed between steps only.
+///
+/// ```
+/// use keydance::autograd::Parameters;
+///
+/// let mut parameters = Parameters::<f32>::new();
+/// let (_, weight) = parameters.add("weight", ndarray::Array2::zeros((2, 3)).into_dyn());
+/// assert_eq!((parameters.len(), parameters.weights()), (1, 6));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Parameters<T> {
     /// What their ids have, too, and those of no others but clones.

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use ndarray::{ArrayD, ArrayViewD, IxDyn};
+use ndarray::{Array, ArrayD, ArrayViewD, Dimension, IxDyn};
 
 use super::error::AutogradError;
 use super::kernels::Real;
@@ -53,9 +53,6 @@ enum Value<T> {
     Released,
 }
 
-/// Name of the values that [`Tape::input`] makes.
-const INPUT: &str = "input";
-
 struct Node<T> {
     name: &'static str,
     /// That of the [`Var`]s which name it.
@@ -87,6 +84,19 @@ pub(super) struct Lists<T: Real> {
 
 /// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape
 /// ends or [`Tape::forget_since`].
+///
+/// ```
+/// use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
+///
+/// let (parameters, mut workspace) = (Parameters::<f64>::new(), Workspace::new());
+/// let mut tape = Tape::recording(&parameters, &mut workspace);
+/// let x = tape.input(ndarray::arr1(&[1.0, 2.0]));
+/// let y = tape.square(x)?;
+/// let mut gradients = Gradients::zeros(&parameters);
+/// let of_x = tape.backward_from(y, &[1.0, 10.0], &[x], &mut gradients)?.remove(0);
+/// assert_eq!(of_x, ndarray::arr1(&[2.0, 40.0]).into_dyn());
+/// # Ok::<(), keydance::autograd::AutogradError>(())
+/// ```
 pub struct Tape<'a, T: Real> {
     parameters: &'a Parameters<T>,
     workspace: &'a mut Workspace<T>,
@@ -178,8 +188,8 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     /// A value that is given and wants no gradient.
-    pub fn constant(&mut self, value: ArrayD<T>) -> Var {
-        self.leaf("constant", value, false)
+    pub fn constant<D: Dimension>(&mut self, value: Array<T, D>) -> Var {
+        self.leaf("constant", value.into_dyn(), false)
     }
 
     /// A constant of the given shape in a reused buffer that `fill` writes, all of it.
@@ -207,8 +217,8 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     /// A value that is given and wants a gradient of its own, see [`Tape::backward_from`].
-    pub fn input(&mut self, value: ArrayD<T>) -> Var {
-        self.leaf(INPUT, value, true)
+    pub fn input<D: Dimension>(&mut self, value: Array<T, D>) -> Var {
+        self.leaf("input", value.into_dyn(), true)
     }
 
     fn leaf(&mut self, name: &'static str, value: ArrayD<T>, needs_gradient: bool) -> Var {
@@ -340,9 +350,28 @@ impl<'a, T: Real> Tape<'a, T> {
         }
     }
 
-    /// Puts an operation's output on the tape. `operation` is asked for only where a way back is
-    /// wanted.
-    pub(super) fn record<O: Operation<T> + 'static>(
+    /// Puts the output of an operation of one's own on the tape: `name` for errors, the `inputs`
+    /// that it was computed from, and the way back, which is asked for only where one is wanted.
+    ///
+    /// `examples/custom_operation.rs` is a whole one, with the property check of its gradient.
+    ///
+    /// # Errors
+    /// An input of another tape.
+    pub fn record<D: Dimension, O: Operation<T> + 'static>(
+        &mut self,
+        name: &'static str,
+        inputs: &[Var],
+        output: Array<T, D>,
+        operation: impl FnOnce() -> O,
+    ) -> Result<Var, AutogradError> {
+        self.own(name, inputs)?;
+        let numbers = output.iter().copied().collect();
+        Ok(self.put(name, inputs, output.shape(), numbers, operation))
+    }
+
+    /// [`Tape::record`] for operands that are known to be on the tape, and numbers in row-major
+    /// order.
+    pub(super) fn put<O: Operation<T> + 'static>(
         &mut self,
         name: &'static str,
         inputs: &[Var],

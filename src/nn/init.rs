@@ -12,6 +12,18 @@ use crate::autograd::{AutogradError, BlockId, BufferId, ParameterId, Parameters,
 pub const MOST_WEIGHTS: usize = 1 << 28;
 
 /// Adds named parameters with initial values drawn from one stream.
+///
+/// ```
+/// use keydance::autograd::Parameters;
+/// use keydance::nn::{Initialiser, Linear};
+/// use rand::SeedableRng as _;
+///
+/// let mut parameters = Parameters::<f32>::new();
+/// let rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+/// let layer = Linear::new(&mut Initialiser::new(&mut parameters, rng), "layer", 3, 2);
+/// let names: Vec<&str> = parameters.iter().map(|(name, _)| name).collect();
+/// assert_eq!(names, ["layer.weight", "layer.bias"]);
+/// ```
 pub struct Initialiser<'a, T, R> {
     parameters: &'a mut Parameters<T>,
     rng: R,

@@ -38,13 +38,11 @@ fn difference(
     let shape = tape.shape(a)?.to_vec();
     let pairs = tape.values(a)?.iter().zip(tape.values(b)?);
     let y = pairs.map(|(a, b)| a - b).collect();
-    Ok(
-        tape.record("difference", &[a, b], &shape, y, || Difference {
-            a,
-            b,
-            mistake,
-        }),
-    )
+    Ok(tape.put("difference", &[a, b], &shape, y, || Difference {
+        a,
+        b,
+        mistake,
+    }))
 }
 
 /// x [rows, n] + b [n]; the mistake: db is that of the last row, not the sum over rows.
@@ -77,7 +75,7 @@ fn shift(tape: &mut Tape<'_, f64>, x: Var, b: Var, mistake: bool) -> Result<Var,
         .zip(bias)
         .map(|(x, b)| x + b)
         .collect();
-    Ok(tape.record("shift", &[x, b], &shape, y, || Shift { x, b, mistake }))
+    Ok(tape.put("shift", &[x, b], &shape, y, || Shift { x, b, mistake }))
 }
 
 /// A B for matrices [n, n]; the mistake: dA = dC B instead of dC B^T.
@@ -112,7 +110,7 @@ fn matrices(tape: &mut Tape<'_, f64>, a: Var, b: Var, mistake: bool) -> Result<V
         Mat::new(tape.values(b)?, n, n),
     );
     product(left, right, MatMut::new(&mut y, n, n), false);
-    Ok(tape.record("product", &[a, b], &[n, n], y, || Product {
+    Ok(tape.put("product", &[a, b], &[n, n], y, || Product {
         a,
         b,
         n,

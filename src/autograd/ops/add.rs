@@ -39,7 +39,7 @@ pub(super) fn signed_sum<T: Real>(
     let mut y = tape.take_for(name, &shape)?;
     let (left, right) = (tape.known().array(a), tape.known().array(b));
     zip_into(&mut y, &shape, left, right, |x, y| x + sign * y);
-    Ok(tape.record(name, &[a, b], &shape, y, || Sum {
+    Ok(tape.put(name, &[a, b], &shape, y, || Sum {
         a,
         b,
         sign,

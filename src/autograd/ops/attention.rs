@@ -140,7 +140,7 @@ impl<T: Real> Attention<T> {
         let numbers: usize = output.iter().product();
         if numbers == 0 {
             // However many tokens a window would have.
-            return tape.record(name, &inputs, output, Vec::new(), || self);
+            return tape.put(name, &inputs, output, Vec::new(), || self);
         }
         let windows = numbers / (shape.queries * shape.width);
         let mut p = tape.take(windows * shape.heads * shape.block());
@@ -177,7 +177,7 @@ impl<T: Real> Attention<T> {
         } else {
             tape.give(p);
         }
-        tape.record(name, &inputs, output, y, || self)
+        tape.put(name, &inputs, output, y, || self)
     }
 }
 

@@ -50,7 +50,7 @@ pub(super) fn columns_of<T: Real>(
             y.copy_from_slice(&x[range.clone()]);
         }
     }
-    tape.record(name, &[x], shape, y, || Columns {
+    tape.put(name, &[x], shape, y, || Columns {
         x,
         start,
         width,

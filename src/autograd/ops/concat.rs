@@ -71,7 +71,7 @@ impl<T: Real> Tape<'_, T> {
             start += width;
         }
         shape[lead] = total;
-        Ok(self.record("concat", parts, &shape, y, || Concat {
+        Ok(self.put("concat", parts, &shape, y, || Concat {
             parts: widths,
             total,
         }))

@@ -42,7 +42,7 @@ impl<T: Real> Tape<'_, T> {
         let shape = self.known().shape(x).to_vec();
         let mut y = self.take(self.known().values(x).len());
         dropout_into(key, p, self.known().values(x), &mut y);
-        Ok(self.record("dropout", &[x], &shape, y, || Dropout { x, p, key }))
+        Ok(self.put("dropout", &[x], &shape, y, || Dropout { x, p, key }))
     }
 }
 

@@ -152,7 +152,7 @@ impl<T: Real> Tape<'_, T> {
             parents: parents.to_vec(),
             world,
         };
-        Ok(self.record(NAME, &inputs, &shape, positions, operation))
+        Ok(self.put(NAME, &inputs, &shape, positions, operation))
     }
 }
 

@@ -164,7 +164,7 @@ pub(super) fn layer_norm<T: Real>(
     if !tape.is_recording() {
         tape.give(std::mem::take(&mut statistics));
     }
-    Ok(tape.record(name, &inputs, &shape, y, || LayerNorm {
+    Ok(tape.put(name, &inputs, &shape, y, || LayerNorm {
         x,
         residual,
         gamma,

@@ -121,7 +121,7 @@ impl<T: Real> Tape<'_, T> {
             outputs,
             relu,
         );
-        Ok(self.record("linear", &all, &shape, y, || Linear {
+        Ok(self.put("linear", &all, &shape, y, || Linear {
             x,
             weight,
             bias,

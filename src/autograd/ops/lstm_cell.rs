@@ -196,7 +196,7 @@ impl<T: Real> Tape<'_, T> {
             hidden: n,
             gates,
         };
-        Ok(self.record("lstm_cell", &all, &[batch, 2 * n], y, operation))
+        Ok(self.put("lstm_cell", &all, &[batch, 2 * n], y, operation))
     }
 }
 

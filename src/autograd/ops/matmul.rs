@@ -51,7 +51,7 @@ impl<T: Real> Tape<'_, T> {
             false,
         );
         let sizes = [m, k, n];
-        Ok(self.record("matmul", &[a, b], &[m, n], y, || Matmul { a, b, sizes }))
+        Ok(self.put("matmul", &[a, b], &[m, n], y, || Matmul { a, b, sizes }))
     }
 }
 

@@ -16,13 +16,16 @@ mod broadcast;
 mod clamp;
 mod columns;
 mod concat;
+mod div;
 mod dropout;
 mod exp;
 mod forward_kinematics;
 mod layer_norm;
 mod linear;
+mod ln;
 pub mod lstm_cell;
 mod matmul;
+mod mean;
 mod mul;
 mod noise;
 mod normalise;
@@ -103,13 +106,16 @@ mod gradient_is_that_of_central_differences {
         clamp,
         columns,
         concat,
+        div,
         dropout,
         exp,
         forward_kinematics,
         layer_norm,
         linear,
+        ln,
         lstm_cell,
         matmul,
+        mean,
         mul,
         noise,
         normalise,

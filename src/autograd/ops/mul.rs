@@ -46,7 +46,7 @@ impl<T: Real> Tape<'_, T> {
             self.known().array(b),
             |x, y| x * y,
         );
-        Ok(self.record("mul", &[a, b], &shape, y, || Mul {
+        Ok(self.put("mul", &[a, b], &shape, y, || Mul {
             a,
             b,
             shape: shape.clone(),

@@ -41,7 +41,7 @@ impl<T: Real> Tape<'_, T> {
             let drawn: f64 = StandardNormal.sample(&mut rng);
             *y += T::from_f64(deviation * drawn);
         }
-        Ok(self.record("noise", &[x], &shape, y, || Noise { x }))
+        Ok(self.put("noise", &[x], &shape, y, || Noise { x }))
     }
 }
 

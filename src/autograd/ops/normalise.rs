@@ -56,7 +56,7 @@ impl<T: Real> Tape<'_, T> {
             let n = length(vector, eps);
             vector.iter_mut().for_each(|x| *x /= n);
         }
-        Ok(self.record("normalise", &[x], &shape, y, || Normalise { x, width, eps }))
+        Ok(self.put("normalise", &[x], &shape, y, || Normalise { x, width, eps }))
     }
 }
 

@@ -70,7 +70,7 @@ impl<T: Real> Tape<'_, T> {
                 }
             },
         );
-        Ok(self.record("prelu", &[x, slope], &shape, y, || Prelu { x, slope }))
+        Ok(self.put("prelu", &[x, slope], &shape, y, || Prelu { x, slope }))
     }
 }
 

@@ -271,7 +271,7 @@ impl<T: Real> Tape<'_, T> {
             m,
             z,
         };
-        Ok(self.record(NAME, &inputs, &[batch, all], y, operation))
+        Ok(self.put(NAME, &inputs, &[batch, all], y, operation))
     }
 
     fn query_attention_sizes(

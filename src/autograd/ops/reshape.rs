@@ -38,7 +38,7 @@ impl<T: Real> Tape<'_, T> {
         }
         let mut y = self.take_for("reshape", shape)?;
         y.copy_from_slice(self.known().values(x));
-        Ok(self.record("reshape", &[x], shape, y, || Reshape { x }))
+        Ok(self.put("reshape", &[x], shape, y, || Reshape { x }))
     }
 }
 

@@ -50,7 +50,7 @@ impl<T: Real> Tape<'_, T> {
             let scale = T::one() / sum_with(row.len(), |j| row[j]);
             row.iter_mut().for_each(|x| *x *= scale);
         }
-        Ok(self.record("softmax", &[x], &shape, y, || Softmax { x, columns }))
+        Ok(self.put("softmax", &[x], &shape, y, || Softmax { x, columns }))
     }
 }
 

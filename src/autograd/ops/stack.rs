@@ -47,7 +47,7 @@ impl<T: Real> Tape<'_, T> {
         }
         let mut shape = vec![parts.len()];
         shape.extend_from_slice(self.known().shape(first));
-        Ok(self.record("stack", parts, &shape, y, || Stack {
+        Ok(self.put("stack", parts, &shape, y, || Stack {
             parts: parts.to_vec(),
         }))
     }

@@ -30,7 +30,7 @@ impl<T: Real> Tape<'_, T> {
         let mut y = self.take(1);
         let values = self.known().values(x);
         y[0] = sum_with(values.len(), |i| values[i]);
-        Ok(self.record("sum", &[x], &[1], y, || Sum { x }))
+        Ok(self.put("sum", &[x], &[1], y, || Sum { x }))
     }
 }
 

@@ -27,5 +27,5 @@ pub(super) fn unary<T: Real>(
     tape.own(name, &[x])?;
     let (shape, mut y) = tape.copy(x);
     forward(&mut y);
-    Ok(tape.record(name, &[x], &shape, y, || Unary { x, derivative }))
+    Ok(tape.put(name, &[x], &shape, y, || Unary { x, derivative }))
 }

@@ -50,7 +50,7 @@ impl<T: Real> Tape<'_, T> {
             let row = &values[row * columns..(row + 1) * columns];
             *y = (sum_with(columns, |j| row[j] * row[j]) + eps).sqrt();
         }
-        Ok(self.record("vector_norm", &[x], &shape, y, || VectorNorm { x, columns }))
+        Ok(self.put("vector_norm", &[x], &shape, y, || VectorNorm { x, columns }))
     }
 }
 

@@ -1,9 +1,11 @@
 //! The way back through a tape.
 
+use std::cell::Cell;
+
 use ndarray::{ArrayD, ArrayViewD, IxDyn};
 
 use super::known::Known;
-use super::{INPUT, Tape, Value, Var, not_finite};
+use super::{Tape, Value, Var, not_finite};
 use crate::autograd::error::AutogradError;
 use crate::autograd::kernels::{Mat, MatMut, Real, product_at, vectorised};
 use crate::autograd::parameters::Gradients;
@@ -31,21 +33,23 @@ impl<T: Real> Tape<'_, T> {
     }
 
     /// Runs the tape backwards from `output` with the upstream gradient `upstream` (in the output's
-    /// layout); adds the gradients of the parameters to `gradients` and returns those of `inputs`
-    /// (values made by [`Tape::input`]), in their order.
+    /// layout); adds the gradients of the parameters to `gradients` and returns those of `values`,
+    /// in their order: what [`Tape::input`] made and whatever was computed of it or of parameters.
     ///
     /// # Errors
-    /// A tape that does not record; an output of another tape; gradients of other parameters; an
-    /// upstream gradient of another length than the output; an input that is no value of
-    /// [`Tape::input`] on this tape; where the tape traces, a gradient that is not finite.
+    /// A tape that does not record; an output or a value of another tape; gradients of other
+    /// parameters; an upstream gradient of another length than the output; a value that has no
+    /// gradient (a constant, or computed of constants) or is a parameter, whose gradient is in
+    /// `gradients`; an operation of one's own whose way back asks for values that are not among its
+    /// inputs; where the tape traces, a gradient that is not finite.
     pub fn backward_from(
         mut self,
         output: Var,
         upstream: &[T],
-        inputs: &[Var],
+        values: &[Var],
         gradients: &mut Gradients<T>,
     ) -> Result<Vec<ArrayD<T>>, AutogradError> {
-        self.check_backward(output, upstream, inputs, gradients)?;
+        self.check_backward(output, upstream, values, gradients)?;
         let lists = self.workspace.lists();
         let mut slots = std::mem::take(&mut lists.slots);
         slots.resize_with(self.nodes.len(), || None);
@@ -70,8 +74,22 @@ impl<T: Real> Tape<'_, T> {
                 gradients,
                 output: index,
                 staged: !self.trace,
+                misuse: Cell::new(None),
             };
             context.flush_staging(index);
+            if values.iter().any(|value| value.index() == index) {
+                let shape = context.known.nodes[index].shape(self.parameters);
+                // Here it is whole: the operations that read the value are done.
+                let gradient = match &context.slots[index] {
+                    Some(gradient) => gradient.clone(),
+                    None => vec![T::zero(); shape.iter().product()],
+                };
+                let array = ArrayD::from_shape_vec(IxDyn(shape), gradient)
+                    .expect("a gradient has the shape of its value");
+                let places = values.iter().enumerate();
+                let places = places.filter(|(_, value)| value.index() == index);
+                found.extend(places.map(|(place, _)| (place, array.clone())));
+            }
             if let Some(mut operation) = operation {
                 if let Some(mut dy) = context.slots[index].take() {
                     if self.trace
@@ -80,6 +98,10 @@ impl<T: Real> Tape<'_, T> {
                         return Err(self.non_finite(index, what, "gradient"));
                     }
                     operation.backward(&mut dy, &mut context);
+                    if let Some(what) = context.misuse.take() {
+                        let operation = self.nodes[index].name;
+                        return Err(AutogradError::Misplaced { operation, what });
+                    }
                     if self.trace
                         && let Some(what) = self.nodes[index].inputs.iter().find_map(|input| {
                             let gradient = match self.nodes[input.index()].value {
@@ -94,17 +116,6 @@ impl<T: Real> Tape<'_, T> {
                     self.workspace.give(dy);
                 }
                 operation.release(self.workspace);
-            }
-            if inputs.iter().any(|input| input.index() == index) {
-                let shape = self.nodes[index].shape(self.parameters).to_vec();
-                let gradient = slots[index]
-                    .take()
-                    .unwrap_or_else(|| vec![T::zero(); shape.iter().product()]);
-                let array = ArrayD::from_shape_vec(IxDyn(&shape), gradient)
-                    .expect("a gradient has the shape of its value");
-                let places = inputs.iter().enumerate();
-                let places = places.filter(|(_, input)| input.index() == index);
-                found.extend(places.map(|(place, _)| (place, array.clone())));
             }
             // Later operations are done and this one too: nothing reads the value any more.
             if index != output.index()
@@ -129,12 +140,12 @@ impl<T: Real> Tape<'_, T> {
         &self,
         output: Var,
         upstream: &[T],
-        inputs: &[Var],
+        values: &[Var],
         gradients: &Gradients<T>,
     ) -> Result<(), AutogradError> {
         let operation = "backward_from";
         self.own(operation, &[output])?;
-        self.own(operation, inputs)?;
+        self.own(operation, values)?;
         if !self.recording || !gradients.fit(self.parameters) {
             let what = match self.recording {
                 true => "the gradients are those of other parameters than the tape's",
@@ -152,14 +163,16 @@ impl<T: Real> Tape<'_, T> {
             let argument = format!("an upstream gradient of {} numbers", upstream.len());
             return Err(unfit(output, argument, "one for each number of the output"));
         }
-        let mut places = inputs.iter().enumerate();
-        match places.find(|(_, input)| self.nodes[input.index()].name != INPUT) {
-            Some((place, &input)) => {
-                let expected = "a value of Tape::input";
-                Err(unfit(input, format!("input {place}"), expected))
-            }
-            None => Ok(()),
+        for (place, &value) in values.iter().enumerate() {
+            let node = &self.nodes[value.index()];
+            let expected = match node.value {
+                Value::Block(_) => "no parameter: its gradient is in the gradients",
+                _ if node.needs_gradient || self.known().values(value).is_empty() => continue,
+                _ => "a value of Tape::input, or computed of one or of parameters",
+            };
+            return Err(unfit(value, format!("value {place}"), expected));
         }
+        Ok(())
     }
 }
 
@@ -168,6 +181,7 @@ pub struct Target<'t, T> {
     pub data: &'t mut [T],
     /// Whether the content is undefined, to be written whole, rather than a sum to be added to.
     pub fresh: bool,
+    misuse: &'t Cell<Option<&'static str>>,
 }
 
 impl<'t, T: Real> Target<'t, T> {
@@ -179,8 +193,12 @@ impl<'t, T: Real> Target<'t, T> {
         self.data
     }
 
-    /// Adds `values` to the gradient.
+    /// Adds `values` to the gradient; of another length they end the way back with an error.
     pub fn add_values(self, values: &[T]) {
+        if values.len() != self.data.len() {
+            let what = "its way back adds more or fewer numbers than an input has";
+            return self.misuse.set(Some(what));
+        }
         if self.fresh {
             self.data.copy_from_slice(values);
             return;
@@ -228,21 +246,42 @@ pub struct Backward<'s, T: Real> {
     /// Whether rows for a weight's gradient are collected; not where each operation's share in it
     /// is looked at.
     staged: bool,
+    /// What an operation did that it must not; the way back ends with it.
+    misuse: Cell<Option<&'static str>>,
 }
 
+/// Asked for a value that was not on the tape before the operation, all say that there are no
+/// numbers, and the way back ends with an error.
 impl<'s, T: Real> Backward<'s, T> {
     /// The numbers of an earlier value in row-major order.
     pub fn values(&self, var: Var) -> &'s [T] {
-        self.known.values(var)
+        match self.knows(var) {
+            true => self.known.values(var),
+            false => &[],
+        }
     }
 
     pub fn shape(&self, var: Var) -> &'s [usize] {
-        self.known.shape(var)
+        match self.knows(var) {
+            true => self.known.shape(var),
+            false => &[0],
+        }
     }
 
     /// An earlier value as an array.
     pub fn array(&self, var: Var) -> ArrayViewD<'s, T> {
-        self.known.array(var)
+        ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
+            .expect("a value has as many numbers as its shape says")
+    }
+
+    fn knows(&self, var: Var) -> bool {
+        let earlier = self.known.nodes.get(var.index());
+        let knows = earlier.is_some_and(|node| node.stamp == var.stamp);
+        if !knows {
+            let what = "its way back asks for a value that is not among its inputs";
+            self.misuse.set(Some(what));
+        }
+        knows
     }
 
     /// The operation's own output.
@@ -255,7 +294,7 @@ impl<'s, T: Real> Backward<'s, T> {
     }
 
     pub fn needs_gradient(&self, var: Var) -> bool {
-        self.known.nodes[var.index()].needs_gradient
+        self.knows(var) && self.known.nodes[var.index()].needs_gradient
     }
 
     pub fn take(&mut self, len: usize) -> Vec<T> {
@@ -268,7 +307,10 @@ impl<'s, T: Real> Backward<'s, T> {
 
     /// Where to add the gradient of an input, if it wants one.
     pub fn target(&mut self, var: Var) -> Option<Target<'_, T>> {
-        self.target_at(var.index())
+        match self.knows(var) {
+            true => self.target_at(var.index()),
+            false => None,
+        }
     }
 
     fn target_at(&mut self, index: usize) -> Option<Target<'_, T>> {
@@ -280,12 +322,18 @@ impl<'s, T: Real> Backward<'s, T> {
             Value::Block(id) => Some(Target {
                 data: self.gradients.block_mut(self.known.parameters, *id),
                 fresh: false,
+                misuse: &self.misuse,
             }),
             Value::Array(array) => {
                 let slot = &mut self.slots[index];
                 let fresh = slot.is_none();
                 let data = slot.get_or_insert_with(|| self.workspace.take(array.len()));
-                Some(Target { data, fresh })
+                let misuse = &self.misuse;
+                Some(Target {
+                    data,
+                    fresh,
+                    misuse,
+                })
             }
             Value::Released => None,
         }
