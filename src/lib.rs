@@ -1,4 +1,23 @@
-//! Dance synthesis: the models of several papers, side by side.
+//! Dance synthesis: the models of several papers, side by side, on an autograd engine of its own.
+//!
+//! ```
+//! use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
+//!
+//! let mut parameters = Parameters::<f64>::new();
+//! let (_, weight) = parameters.add("weight", ndarray::arr1(&[3.0, -1.0]).into_dyn());
+//! let (mut gradients, mut workspace) = (Gradients::zeros(&parameters), Workspace::new());
+//! let mut tape = Tape::recording(&parameters, &mut workspace);
+//! let weight = tape.block(weight)?;
+//! let squares = tape.square(weight)?;
+//! let loss = tape.sum(squares)?;
+//! tape.backward(loss, &mut gradients)?;
+//! assert_eq!(gradients.iter().next(), Some(&[6.0, -2.0][..]));
+//! # Ok::<(), keydance::autograd::AutogradError>(())
+//! ```
+//!
+//! `examples/` has an MLP with Adam on a sine, an LSTM, attention, an operation of one's own, BVH
+//! in and out, and a model used from code. A crate that needs no command line depends on keydance
+//! with `default-features = false, features = ["papers"]`, or on the engine alone without any.
 //!
 //! The modules in reading order, the path of the data:
 //!

@@ -25,6 +25,7 @@ mod demo;
 mod documents;
 mod elsewhere;
 mod evaluate;
+mod examples;
 mod figures;
 mod generate;
 mod odd_files;
