@@ -53,8 +53,14 @@ impl<T: Real> Workspace<T> {
     /// The same; none where memory does not hold it.
     pub(super) fn try_take(&mut self, len: usize) -> Option<Vec<T>> {
         let class = class(len);
-        let mut buffer = self.free(class).unwrap_or_default();
-        buffer.try_reserve_exact(class).ok()?;
+        let mut buffer = match self.free(class) {
+            Some(buffer) => buffer,
+            None => {
+                let mut buffer = Vec::new();
+                buffer.try_reserve_exact(class).ok()?;
+                buffer
+            }
+        };
         buffer.resize(len, T::zero());
         Some(buffer)
     }

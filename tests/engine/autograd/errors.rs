@@ -3,7 +3,9 @@
 use keydance::autograd::ops::attention::{AttentionShape, HeadColumns};
 use keydance::autograd::ops::lstm_cell::LstmWeights;
 use keydance::autograd::ops::query_attention::QueryAttentionWeights;
-use keydance::autograd::{AutogradError, Gradients, Parameters, Tape, Var, Workspace};
+use keydance::autograd::{
+    AutogradError, Backward, Gradients, Operation, Parameters, Tape, Var, Workspace,
+};
 use ndarray::{ArrayD, IxDyn, arr1, arr2};
 
 type Build = fn(&mut Tape<'_, f64>, Var, Var) -> Result<Var, AutogradError>;
@@ -265,11 +267,71 @@ fn a_way_back_from_what_does_not_fit_is_refused_and_an_input_asked_for_twice_ans
             "{error}"
         );
     }
-    let error = gradients_of(&[1.0], |x, y| vec![x, y])
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("input 1") && error.contains("Tape::input"),
-        "{error}"
+    assert_eq!(
+        gradients_of(&[1.0], |x, y| vec![y, x]).unwrap(),
+        [18.0, 108.0],
+        "a value on the way"
     );
+}
+
+#[test]
+fn the_gradient_of_a_constant_or_a_parameter_is_refused() {
+    let mut parameters = Parameters::new();
+    let (_, block) = parameters.add("w", arr1(&[3.0]).into_dyn());
+    for constant in [true, false] {
+        let mut workspace = Workspace::new();
+        let mut tape = Tape::recording(&parameters, &mut workspace);
+        let (fixed, weight) = (tape.constant(arr1(&[2.0])), tape.block(block).unwrap());
+        let product = tape.mul(fixed, weight).unwrap();
+        let mut sums = Gradients::zeros(&parameters);
+        let (asked, expected) = match constant {
+            true => (fixed, "Tape::input"),
+            false => (weight, "no parameter"),
+        };
+        let error = tape.backward_from(product, &[1.0], &[asked], &mut sums);
+        let error = error.unwrap_err().to_string();
+        assert!(
+            error.contains("value 0") && error.contains(expected),
+            "{error}"
+        );
+    }
+}
+
+/// Its way back does what it must not.
+struct Astray {
+    other: Var,
+    surplus: bool,
+}
+
+impl Operation<f64> for Astray {
+    fn backward(&self, _dy: &mut [f64], context: &mut Backward<'_, f64>) {
+        let numbers = vec![1.0; context.values(self.other).len() + usize::from(self.surplus)];
+        if let Some(target) = context.target(self.other) {
+            target.add_values(&numbers);
+        }
+    }
+}
+
+#[test]
+fn an_operation_of_ones_own_that_goes_astray_ends_the_way_back_with_its_name() {
+    let parameters = Parameters::new();
+    let mut workspace = Workspace::new();
+    let foreign = {
+        let mut tape = Tape::recording(&parameters, &mut workspace);
+        tape.input(arr1(&[1.0, 2.0]))
+    };
+    for (surplus, expected) in [(false, "not among its inputs"), (true, "more or fewer")] {
+        let mut tape = Tape::recording(&parameters, &mut workspace);
+        let x = tape.input(arr1(&[1.0, 2.0]));
+        let other = if surplus { x } else { foreign };
+        let astray = || Astray { other, surplus };
+        let y = tape.record("astray", &[x], arr1(&[0.0]), astray).unwrap();
+        let mut sums = Gradients::zeros(&parameters);
+        let error = tape.backward_from(y, &[1.0], &[x], &mut sums).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("astray") && text.contains(expected), "{text}");
+        let mut tape = Tape::recording(&parameters, &mut workspace);
+        let error = tape.record("astray", &[foreign], arr1(&[0.0]), astray);
+        assert!(error.unwrap_err().to_string().contains("not on this tape"));
+    }
 }
