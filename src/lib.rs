@@ -41,6 +41,8 @@
 // They panic where the output is closed: writeln! with its error to stdout, cli::notice to stderr.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+mod counted;
+
 pub mod autograd;
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use crate::counted::counted;
 use crate::experiment::ExperimentConfig;
 use crate::models::transition::ModelConfig;
 use crate::models::transition::measure::MeasuredGeneration;
@@ -112,8 +113,9 @@ pub fn layers(args: LayersArgs) -> anyhow::Result<()> {
         "encoder_layers_ms": encoder,
     });
     let text = format!(
-        "{threads} threads: LSTM 1024 -> 256 and linear, 128 x 30: {lstm:.1} ms; two encoder \
-         layers, 128 windows of 7: {encoder:.1} ms"
+        "{}: LSTM 1024 -> 256 and linear, 128 x 30: {lstm:.1} ms; two encoder \
+         layers, 128 windows of 7: {encoder:.1} ms",
+        counted(threads, "thread")
     );
     print(args.json, &result, &text)
 }
@@ -136,8 +138,9 @@ pub fn generate(args: GenerateArgs) -> anyhow::Result<()> {
         "frames_per_second": frames_per_second,
     });
     let text = format!(
-        "generation, {batch} at once, {threads} threads: {ms_per_frame:.2} ms a frame, \
-         {frames_per_second:.0} frames/s"
+        "generation, {batch} at once, {}: {ms_per_frame:.2} ms a frame, \
+         {frames_per_second:.0} frames/s",
+        counted(threads, "thread")
     );
     print(args.json, &result, &text)
 }

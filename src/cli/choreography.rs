@@ -22,7 +22,7 @@ pub struct ChoreographyArgs {
     /// Frames of each clip, at 30 a second
     #[arg(long, default_value_t = ChoreographyConfig::default().frames_per_clip)]
     frames: usize,
-    /// Other numbers give other dances
+    /// Number that the dances follow from
     #[arg(long, default_value_t = ChoreographyConfig::default().seed)]
     seed: u64,
     /// Write into a folder that holds files, and replace those of the same names

@@ -14,6 +14,7 @@ use super::notice::notice;
 use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{ProtocolScores, Tables};
 use crate::experiment::ExperimentConfig;
@@ -30,9 +31,9 @@ const BEHIND: u8 = 4;
 
 /// Generate dance clips, train a small model on them, score it beside what needs no training
 ///
-/// Needs no data, takes two to three minutes on two cores and gives the same numbers each time.
-/// Ends with exit code 4 if the model is not ahead in LRP at 100 and 150 frames, of interpolation
-/// and of the linear estimate that it was before its training.
+/// No data needed, two to three minutes on two cores, the same numbers each time. Exit code 4 if
+/// the model is not ahead in LRP at 100 and 150 frames, of interpolation and of the linear estimate
+/// that it was before its training.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Folder for the results; those of an earlier demo there are replaced
@@ -75,7 +76,8 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let protocols = &config.protocols()[..1];
     let protocol = &*protocols[0];
     let evaluate = |model: &dyn Generator| {
-        pool.install(|| evaluate_watched(protocol, model, &dataset, DataPart::Test))
+        let part = DataPart::Test;
+        pool.install(|| evaluate_watched(protocol, model, &dataset, part, true, None))
             .map(|evaluated| ProtocolScores::new([(protocol.name(), evaluated.scores)]))
     };
     let comparison = Comparison {
@@ -124,13 +126,14 @@ fn train(
     let mut trainer = Trainer::new(config.clone(), dataset, threads)?;
     writeln!(
         std::io::stdout(),
-        "a whole model with {} weights; {} steps, {} frame-steps on {threads} threads",
+        "a whole model with {} weights; {}, {} frame-steps on {}",
         thousands(trainer.parameters().weights() as u64),
-        trainer.task().steps(),
-        thousands(trainer.task().frame_steps())
+        counted(trainer.task().steps(), "step"),
+        thousands(trainer.task().frame_steps()),
+        counted(threads, "thread")
     )?;
     let untrained = trainer.model();
-    let mut progress = Progress::new(trainer.task(), 0);
+    let mut progress = Progress::new(String::new(), trainer.task(), 0);
     let mut losses = Losses::default();
     let outcome = trainer.run(Some(run), &mut |report| {
         progress.step(report);

@@ -4,14 +4,19 @@
 use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 
 use super::clip_choice::ClipChoice;
-use super::notice::warn;
+use super::list::within;
+use super::notice::{notice, warn};
+use super::stop::{Stop, interrupted};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
+use crate::evaluation::protocol::choose;
 use crate::evaluation::{
     EvaluatedData, EvaluationOptions, EvaluationRecord, ProtocolScores, TableRow, Tables,
 };
@@ -30,7 +35,7 @@ pub struct EvaluateArgs {
     clips: ClipChoice,
     /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is
     /// the mean over these
-    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = within(1..=10_000u16))]
     lengths: Vec<u16>,
     /// Score at most this many windows of each length, spread evenly over all: cheap, and not
     /// comparable with scores on all of them
@@ -63,7 +68,7 @@ pub struct EvaluateArgs {
 /// # Errors
 /// The run, its weights or the data cannot be used, or do not fit each other; nothing is written
 /// then. A file cannot be written.
-pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
+pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     let subject = Subject::open(&args.run, &args.set)?;
     let inputs = subject.files();
     check_outputs(&args.json, inputs.iter().chain([&args.data]), args.force)?;
@@ -79,30 +84,29 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     if subject.run.is_some() && folder.is_none() {
         warn(["the run keeps its scores on other clips; --force replaces them"]);
     }
-    writeln!(
-        out,
-        "{} on {} {} clips, {} frames\n",
-        subject.what, data.clips, data.part, data.frames
-    )?;
+    let clips = counted(data.clips, &format!("{} clip", data.part));
+    writeln!(out, "{} on {clips}, {} frames\n", subject.what, data.frames)?;
     let config = &subject.config;
     let lengths = BTreeSet::from_iter(args.lengths.iter().map(|&length| length.into()));
     let options = EvaluationOptions {
         lengths: lengths.into_iter().collect(),
         most_windows: args.windows.map(|most| most as usize),
     };
-    let mut protocols = config.model.protocols(&config.data, &options);
-    let known: Vec<&str> = protocols.iter().map(|protocol| protocol.name()).collect();
-    let chosen = |name: &str| args.protocol.iter().any(|chosen| chosen == name);
-    if let Some(name) = args.protocol.iter().find(|name| !known.contains(&&***name)) {
-        let (kind, known) = (config.model.kind(), known.join(", "));
-        anyhow::bail!("--protocol {name}: {kind} has no such protocol; it has {known}");
-    }
-    protocols.retain(|protocol| args.protocol.is_empty() || chosen(protocol.name()));
-    let pool = args.threads.pool()?;
+    let protocols = config.model.protocols(&config.data, &options);
+    let protocols = choose(protocols, &args.protocol, !args.lengths.is_empty())?;
+    let (pool, stop) = (args.threads.pool()?, Stop::on_signal()?);
+    let model = &*subject.model;
     let mut scores = Vec::new();
     for protocol in &protocols {
-        let evaluation =
-            pool.install(|| evaluate_watched(&**protocol, &*subject.model, &dataset, part))?;
+        let evaluation = match pool
+            .install(|| evaluate_watched(&**protocol, model, &dataset, part, true, Some(&stop)))
+        {
+            Err(error) if error.is_stopped() => {
+                notice("stopped; nothing is written, the same command begins again");
+                return Ok(interrupted());
+            }
+            evaluation => evaluation?,
+        };
         warn(&evaluation.warnings);
         scores.push((protocol.name(), evaluation.scores));
     }
@@ -133,5 +137,5 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }

@@ -13,6 +13,8 @@ use clap::Args;
 
 use super::file_units::FileUnits;
 use super::notice::warn;
+use crate::counted::counted;
+use crate::models::generator::NeededPoses;
 use crate::models::transition::DataRanges;
 use crate::motion::bvh;
 use crate::report::viewer::generated_page;
@@ -29,6 +31,10 @@ use velocity::VelocityArgs;
 /// file at another rate is resampled first, so frame 120 of the file's own 120 a second is frame 30
 /// here. The result passes through every keyframe. Keyframes of several dancers are put onto the
 /// first one's bones.
+///
+/// Which controls change the motion depends on the model, as each reads its own: interpolation, for
+/// one, the keyframes alone. A control that the model does not read gets a warning; one that it
+/// needs and does not get is an error.
 #[derive(Debug, Args)]
 pub struct GenerateArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -70,6 +76,11 @@ pub struct GenerateArgs {
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
     subject.check_features()?;
+    let needs = subject.model.needs();
+    if let NeededPoses::Past(frames) = needs.poses {
+        let (what, poses) = (&subject.what, counted(frames, "pose"));
+        anyhow::bail!("{what} dances on from {poses}; generate makes motions between keyframes");
+    }
     let choice = args.keyframes.choice();
     let (mut inputs, own) = (choice.files(), subject.files());
     inputs.extend(&own);
@@ -89,7 +100,6 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let run = subject.run.as_ref();
     let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
     let ranges = ranges.transpose()?.flatten();
-    let needs = subject.model.needs();
     let asked = [args.trajectory.asked(), args.velocity.asked()];
     let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
     warnings.extend(unread.map(ControlWarning::Unread));

@@ -12,6 +12,7 @@ mod figures;
 mod file_units;
 mod generate;
 mod gradcheck;
+mod list;
 mod notice;
 mod progress;
 mod reproduce;
@@ -24,11 +25,13 @@ mod watched;
 
 use std::io;
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
 use self::notice::notice;
 use crate::autograd::kernels::Isa;
+use crate::run::manifest::Build;
 use crate::training::TrainingError;
 
 /// Exit code of a training that ended because a loss or gradient was not finite.
@@ -36,42 +39,62 @@ const DIVERGED: u8 = 3;
 /// Exit code where what read the output no longer does: that of a program which SIGPIPE ends.
 const OUTPUT_CLOSED: u8 = 141;
 
-/// Dance synthesis from keyframes.
+/// Synthesise dance between keyframes: train models, score them, generate with them
 #[derive(Debug, Parser)]
-#[command(version, about, arg_required_else_help = true)]
+#[command(version = VERSION.as_str(), about, arg_required_else_help = true)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
 }
 
+/// Of the program and, where it was built in a git checkout, the commit.
+static VERSION: LazyLock<String> = LazyLock::new(|| Build::this().to_string());
+
+/// The main commands first, benchmarks last.
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(after_help = include_str!("help/demo.txt"))]
+    Demo(demo::DemoArgs),
     /// Train a model
+    #[command(after_help = include_str!("help/train.txt"))]
     Train(train::TrainArgs),
     /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
+    #[command(after_help = include_str!("help/evaluate.txt"))]
     Evaluate(evaluate::EvaluateArgs),
+    #[command(after_help = include_str!("help/generate.txt"))]
     Generate(Box<generate::GenerateArgs>),
+    #[command(after_help = include_str!("help/reproduce.txt"))]
     Reproduce(reproduce::ReproduceArgs),
-    Figures(figures::FiguresArgs),
     /// Set scores beside the paper's in its tables 2 to 4
+    #[command(after_help = include_str!("help/tables.txt"))]
     Tables(tables::TablesArgs),
+    #[command(after_help = include_str!("help/figures.txt"))]
+    Figures(figures::FiguresArgs),
+    #[command(after_help = include_str!("help/runs.txt"))]
     Runs(runs::RunsArgs),
-    Demo(demo::DemoArgs),
-    /// Write generated dance clips as BVH files
-    Choreography(choreography::ChoreographyArgs),
     /// Look into BVH files
+    #[command(after_help = include_str!("help/bvh.txt"))]
     Bvh(bvh::BvhArgs),
     /// Write the features of every frame of a BVH file as one array
+    #[command(after_help = include_str!("help/features.txt"))]
     Features(features::FeaturesArgs),
+    /// Write generated dance clips as BVH files
+    #[command(after_help = include_str!("help/choreography.txt"))]
+    Choreography(choreography::ChoreographyArgs),
     /// Compare the gradient of a model's whole loss with central differences
+    #[command(after_help = include_str!("help/gradcheck.txt"))]
     Gradcheck(gradcheck::GradcheckArgs),
     /// Write a batch with a trained model's outputs, losses and gradients
+    #[command(after_help = include_str!("help/export_batch.txt"))]
     ExportBatch(export_batch::ExportBatchArgs),
     /// Time a training step
+    #[command(after_help = include_str!("help/bench_step.txt"))]
     BenchStep(bench::StepArgs),
     /// Time an LSTM and two Transformer encoder layers, forward and backward
+    #[command(after_help = include_str!("help/bench_layers.txt"))]
     BenchLayers(bench::LayersArgs),
     /// Time the generation of frames
+    #[command(after_help = include_str!("help/bench_generate.txt"))]
     BenchGenerate(bench::GenerateArgs),
 }
 
@@ -84,7 +107,7 @@ impl Cli {
         Isa::asked_for()?;
         match self.command {
             Command::Train(args) => return train::run(args),
-            Command::Evaluate(args) => evaluate::run(args)?,
+            Command::Evaluate(args) => return evaluate::run(args),
             Command::Generate(args) => generate::run(*args)?,
             Command::Reproduce(args) => return reproduce::run(args),
             Command::Figures(args) => figures::run(args)?,

@@ -1,7 +1,6 @@
 //! `keydance reproduce`: reads a folder of configs and a data folder, trains and evaluates each,
 //! writes tables, figures and a manifest.
 
-use std::collections::HashSet;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,6 +8,7 @@ use std::process::ExitCode;
 use anyhow::{anyhow, bail};
 use clap::Args;
 
+use super::list::name;
 use super::notice::{notice, warn};
 use super::progress::Progress;
 use super::stop::{Stop, command_line, interrupted};
@@ -25,12 +25,13 @@ use crate::training::{Resumed, Trainer, TrainingError};
 
 /// Train and evaluate every config of a folder, and write tables, figures and a manifest
 ///
-/// Trains every config of a folder that is not trained yet, evaluates it on the test clips and
-/// writes tables 2 to 4 with the paper's value, ours and the difference, figures and a manifest.
+/// Train every config of a folder that is not trained yet, evaluate it on the test clips and write
+/// tables 2 to 4 with the paper's value, ours and the difference, figures and a manifest.
 ///
 /// A row whose results are in OUT is done. A row whose run is in RUNS goes on from its newest
 /// checkpoint, also after a kill; the end is the same to the bit as without the break. Tables are
-/// written again after every row; rows that are missing show "—".
+/// written again after every row; rows that are missing show "—". Ctrl-C stops training and
+/// evaluation; the same command goes on.
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
     /// Folder of configs, such as experiments/pan2021
@@ -53,11 +54,11 @@ pub struct ReproduceArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Train and evaluate these models only; the tables keep what there is of the others
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
     only: Vec<String>,
     /// Train a model from several seeds, such as whole_model=1,2,3, and show the spread; may be
     /// repeated
-    #[arg(long, value_name = "NAME=SEEDS", value_parser = parse_seeds)]
+    #[arg(long, value_name = "NAME=SEEDS")]
     seeds: Vec<Seeds>,
     /// Train nothing: evaluate the runs that are finished and write the tables
     #[arg(long)]
@@ -71,20 +72,6 @@ pub struct ReproduceArgs {
     force: bool,
     #[command(flatten)]
     threads: Threads,
-}
-
-fn parse_seeds(text: &str) -> Result<Seeds, String> {
-    let expected = || "expected NAME=SEED,SEED,..., such as whole_model=1,2,3".to_string();
-    let (name, list) = text.split_once('=').ok_or_else(expected)?;
-    let seeds = list.split(',').map(|seed| seed.trim().parse().ok());
-    let seeds: Vec<u64> = seeds.collect::<Option<_>>().ok_or_else(expected)?;
-    if seeds.iter().collect::<HashSet<_>>().len() != seeds.len() {
-        return Err(format!("names a seed twice; {}", expected()));
-    }
-    Ok(Seeds {
-        name: name.trim().into(),
-        seeds,
-    })
 }
 
 /// # Errors
@@ -185,10 +172,11 @@ impl Observer for Terminal {
     ) -> io::Result<StepObserver> {
         train::goes_on(resumed)?;
         let (task, before) = (trainer.task(), trainer.frame_steps_done());
-        let mut progress = match self.alone {
-            true => Progress::new(task, before),
-            false => Progress::lines(format!("{}: ", row.folder), task, before),
+        let name = match self.alone {
+            true => String::new(),
+            false => format!("{}: ", row.folder),
         };
+        let mut progress = Progress::new(name, task, before);
         Ok(Box::new(move |report| progress.step(report)))
     }
 
@@ -198,10 +186,8 @@ impl Observer for Terminal {
         model: &dyn Generator,
         dataset: &Dataset,
     ) -> Result<Evaluation, EvaluationError> {
-        match self.alone {
-            true => evaluate_watched(protocol, model, dataset, DataPart::Test),
-            false => protocol.evaluate(model, dataset, DataPart::Test),
-        }
+        let (part, stop) = (DataPart::Test, Some(&self.stop));
+        evaluate_watched(protocol, model, dataset, part, self.alone, stop)
     }
 
     fn stop_asked(&self) -> bool {

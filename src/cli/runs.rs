@@ -11,7 +11,7 @@ use crate::run::RunFolder;
 
 /// List the runs in a folder: state, progress, speed, scores
 ///
-/// Looks into the folders inside it, too. A run is "running" while a training writes to it,
+/// Look into the folders inside it, too. A run is "running" while a training writes to it,
 /// "stopped" after Ctrl-C and "interrupted" after a kill or an error: both go on with `keydance
 /// train --resume`. LRP is in cm, at transitions of 10 to 150 frames, once evaluated.
 #[derive(Debug, Args)]

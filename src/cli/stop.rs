@@ -28,7 +28,7 @@ impl Stop {
             if flag.0.swap(true, Ordering::Relaxed) {
                 std::process::exit(INTERRUPTED.into());
             }
-            notice("stopping after this step; once more to stop at once");
+            notice("stopping; once more to stop at once");
         })
         .context("no handler for Ctrl-C")?;
         Ok(stop)

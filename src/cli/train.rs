@@ -4,13 +4,16 @@ use std::io::{self, Write as _};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
+use indicatif::HumanDuration;
 
 use super::notice::{notice, warn};
 use super::progress::Progress;
 use super::stop::{Stop, command_line, interrupted};
 use super::threads::Threads;
+use crate::counted::counted;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::run::RunFolder;
@@ -45,20 +48,29 @@ pub struct TrainArgs {
 pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
     let mut out = io::stdout();
-    writeln!(out, "{}", config.to_toml()?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
     warn(&dataset.warnings);
     let threads = args.threads.count();
     let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
-    describe(&trainer, threads)?;
-    let run = if args.resume {
+    let (run, resumed) = if args.resume {
         let run = RunFolder::resume(&args.out, &config)?;
-        goes_on(&trainer.resume(&run)?)?;
-        run
+        let resumed = trainer.resume(&run)?;
+        (run, Some(resumed))
     } else {
-        RunFolder::create(&args.out, &config)?
+        (RunFolder::create(&args.out, &config)?, None)
     };
-    let mut progress = Progress::new(trainer.task(), trainer.frame_steps_done());
+    describe(&trainer, threads)?;
+    if let Some(expected) = trainer.expected() {
+        let expected = HumanDuration(expected.max(Duration::from_secs(1)));
+        writeln!(out, "takes about {expected}, as busy as the machine is now")?;
+    }
+    writeln!(out, "\n{}", config.to_toml()?)?;
+    match resumed {
+        Some(Resumed { steps: 0, .. }) => writeln!(out, "no checkpoint yet: begins")?,
+        Some(resumed) => goes_on(&resumed)?,
+        None => {}
+    }
+    let mut progress = Progress::new(String::new(), trainer.task(), trainer.frame_steps_done());
     let stop = Stop::on_signal()?;
     let outcome = trainer.run(Some(&run), &mut |report| {
         progress.step(report);
@@ -95,17 +107,19 @@ pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
     let summary = task.summary().map(|summary| format!("{summary}, "));
     writeln!(
         io::stdout(),
-        "{} parameters; {}{} steps, {} frame-steps; {threads} threads",
+        "{} parameters; {}{}, {} frame-steps; {}",
         trainer.parameters().weights(),
         summary.unwrap_or_default(),
-        task.steps(),
+        counted(task.steps(), "step"),
         task.frame_steps(),
+        counted(threads, "thread")
     )?;
     warn(task.warnings());
     Ok(())
 }
 
-/// Says after which step a training goes on, and which newer checkpoints are damaged.
+/// Says after which step a training goes on, where it does not begin, and what is to be known of
+/// that.
 ///
 /// # Errors
 /// The output cannot be written.
@@ -115,5 +129,11 @@ pub fn goes_on(resumed: &Resumed) -> io::Result<()> {
             "warning: a newer checkpoint is left out: {problem}"
         ));
     }
-    writeln!(io::stdout(), "goes on after step {}", resumed.steps)
+    if let Some(other_bits) = &resumed.other_bits {
+        notice(format_args!("warning: {other_bits}"));
+    }
+    match resumed.steps {
+        0 => Ok(()),
+        steps => writeln!(io::stdout(), "goes on after step {steps}"),
+    }
 }

@@ -1,77 +1,45 @@
-//! A model whose predictions move a progress bar.
+//! An evaluation that shows how far it is, and stops with its command.
 
-use std::io::IsTerminal as _;
+use std::sync::{Mutex, PoisonError};
 
-use indicatif::{ProgressBar, ProgressStyle};
-use ndarray::Array2;
-
+use super::progress::Meter;
+use super::stop::Stop;
 use crate::data::{DataPart, Dataset, Recording};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
-use crate::models::generator::Needs;
-use crate::models::{Generator, ModelError, Motion, Request};
+use crate::models::Generator;
+use crate::models::watched::Watched;
 
-/// Evaluates a model and shows on stderr, where that is a terminal, how far it got.
+/// Evaluates a model and shows on stderr how far it got: with a bar where it is `alone`. Ends early
+/// where `stop` is asked to.
 ///
 /// # Errors
-/// As [`Protocol::evaluate`].
+/// As [`Protocol::evaluate`]; stopped, see [`EvaluationError::is_stopped`].
 pub fn evaluate_watched(
     protocol: &dyn Protocol,
     model: &dyn Generator,
     dataset: &Dataset,
     part: DataPart,
+    alone: bool,
+    stop: Option<&Stop>,
 ) -> Result<Evaluation, EvaluationError> {
     let recordings = part.of(dataset)?.iter();
     let frames: Vec<usize> = recordings.map(Recording::frames).collect();
-    let bar = if std::io::stderr().is_terminal() {
-        let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}  {eta} left");
-        ProgressBar::new(protocol.frames(&frames))
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-            .with_message(format!("evaluating {}", model.name()))
-    } else {
-        ProgressBar::hidden()
+    let shown = Mutex::new((0, Meter::new(protocol.frames(&frames), 0, alone)));
+    let answered = |frames: u64| {
+        let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+        let (done, meter) = &mut *shown;
+        *done += frames;
+        let (_, left) = meter.speed(*done);
+        let (name, share) = (model.name(), meter.share(*done));
+        meter.show(*done, &format!("evaluating {name}  {share}  {left} left"));
     };
-    let evaluation = protocol.evaluate(&Watched { model, bar: &bar }, dataset, part);
-    bar.finish_and_clear();
+    let watched = Watched {
+        model,
+        stopped: &|| stop.is_some_and(Stop::is_asked),
+        answered: &answered,
+    };
+    let evaluation = protocol.evaluate(&watched, dataset, part);
+    let shown = shown.into_inner();
+    shown.unwrap_or_else(PoisonError::into_inner).1.clear();
     evaluation
-}
-
-struct Watched<'a> {
-    model: &'a dyn Generator,
-    /// Counts frames that were asked for.
-    bar: &'a ProgressBar,
-}
-
-impl Watched<'_> {
-    fn count<T>(&self, requests: &[Request], answer: T) -> T {
-        let frames: usize = requests.iter().map(|request| request.frames).sum();
-        self.bar.inc(frames as u64);
-        answer
-    }
-}
-
-impl Generator for Watched<'_> {
-    fn name(&self) -> &str {
-        self.model.name()
-    }
-
-    fn needs(&self) -> Needs {
-        self.model.needs()
-    }
-
-    fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
-        Ok(self.count(requests, self.model.generate(requests)?))
-    }
-
-    fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
-        Ok(self.count(requests, self.model.raw(requests)?))
-    }
-
-    fn log_likelihoods(
-        &self,
-        requests: &[Request],
-        truths: &[Motion],
-    ) -> Result<Vec<f64>, ModelError> {
-        let answer = self.model.log_likelihoods(requests, truths)?;
-        Ok(self.count(requests, answer))
-    }
 }

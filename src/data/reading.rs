@@ -3,6 +3,7 @@
 
 use super::config::DataConfig;
 use super::dataset::{DataError, Recording};
+use crate::counted::counted;
 use crate::motion::frame_rate::meant_rate;
 use crate::motion::oddities::oddities;
 use crate::motion::units::to_cm_and_y_up;
@@ -79,9 +80,9 @@ fn skip_frames(clip: &mut Clip, frames: usize) -> Result<(), DataError> {
         return Err(DataError::Config {
             key: "skip_frames",
             value: format!(
-                "{frames}, but {} has {} frames",
+                "{frames}, but {} has {}",
                 clip.name,
-                clip.poses.len()
+                counted(clip.poses.len(), "frame")
             ),
             expected: "fewer frames than any clip has",
         });

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::config::{DataConfig, Split};
 use super::dataset::{DataError, Dataset, Recording};
+use crate::counted::counted;
 
 /// What the paper's split must hold: clips and frames for training, clips and frames for testing.
 const DANCE_TRAIN: (usize, usize) = (98, 93_347);
@@ -91,7 +92,10 @@ pub(super) fn split(
                     return Err(fault("split.list", name.clone(), expected));
                 }
                 if !names.contains(name) {
-                    let found = format!("does not have it among its {} clips", names.len());
+                    let found = format!(
+                        "does not have it among its {}",
+                        counted(names.len(), "clip")
+                    );
                     return Err(misfit(format!("that {name} is in the split"), found));
                 }
             }

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::{Metric, Scores};
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset, EmptyPart};
 use crate::models::{Generator, ModelError};
 
@@ -56,12 +57,20 @@ pub struct Evaluation {
     pub warnings: Vec<String>,
 }
 
+impl EvaluationError {
+    /// Whether it ended because its model was told to stop.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Self::Model { source, .. } if matches!(**source, ModelError::Stopped))
+    }
+}
+
 /// Why there are no scores.
 #[derive(Debug, Error)]
 pub enum EvaluationError {
     #[error(
-        "none of the {clips} clips has the {needed} frames of a window at N = {length} (the longest has {longest}); \
-         give longer clips or leave this length out"
+        "no clip has the {needed} frames of a window at N = {length} (the longest of {} has {longest}); give longer \
+         clips or leave this length out",
+        counted(*clips, "clip")
     )]
     NoWindows {
         length: usize,
@@ -81,4 +90,32 @@ pub enum EvaluationError {
         what: String,
         source: Box<ModelError>,
     },
+}
+
+/// Those of a model's protocols that are named, all where none is.
+///
+/// # Errors
+/// A name that none of them has; lengths that were asked for of a protocol without any.
+pub fn choose(
+    mut protocols: Vec<Box<dyn Protocol>>,
+    names: &[String],
+    with_lengths: bool,
+) -> Result<Vec<Box<dyn Protocol>>, EvaluationError> {
+    let known: Vec<&str> = protocols.iter().map(|protocol| protocol.name()).collect();
+    let refused = |reason| Err(EvaluationError::Data { reason });
+    if let Some(name) = names.iter().find(|name| !known.contains(&&***name)) {
+        let known = known.join(", ");
+        return refused(format!(
+            "--protocol {name}: the model has no such protocol; it has {known}"
+        ));
+    }
+    protocols.retain(|it| names.is_empty() || names.iter().any(|name| name == it.name()));
+    let without = protocols.iter().find(|it| it.lengths().is_empty());
+    match without.filter(|_| with_lengths) {
+        Some(protocol) => {
+            let name = protocol.name();
+            refused(format!("--lengths: the protocol {name} has no lengths"))
+        }
+        None => Ok(protocols),
+    }
 }

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::ProtocolScores;
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset, EmptyPart, Recording};
 use crate::report::thousands;
 use crate::run::{FileError, write_json};
@@ -58,8 +59,8 @@ impl EvaluatedData {
     /// What the scores were measured on, for a caption.
     pub fn caption(&self) -> String {
         format!(
-            "{} test clips, {} frames, of the data with digest {}",
-            self.clips,
+            "{}, {} frames, of the data with digest {}",
+            counted(self.clips, "test clip"),
             thousands(self.frames as u64),
             self.data_digest
         )

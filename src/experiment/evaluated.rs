@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::{ExperimentConfig, ReproduceError};
+use crate::counted::counted;
 use crate::evaluation::{EvaluationRecord, TableRow};
 use crate::report::{NO_TRAINING, schedule_note};
 use crate::run::{Manifest, RunFolder};
@@ -74,8 +75,10 @@ impl EvaluatedRun {
         });
         let windows = windows.collect::<Vec<_>>().join(", ");
         format!(
-            "on {} test clips ({} frames, windows by length {windows}) of data with digest {}",
-            data.clips, data.frames, data.data_digest
+            "on {} ({} frames, windows by length {windows}) of data with digest {}",
+            counted(data.clips, "test clip"),
+            data.frames,
+            data.data_digest
         )
     }
 }

@@ -55,7 +55,7 @@ pub trait Observer: Sync {
         protocol.evaluate(model, dataset, DataPart::Test)
     }
 
-    /// Whether to stop after the step at hand.
+    /// Whether to stop after the step, or in the evaluation, at hand.
     fn stop_asked(&self) -> bool;
 }
 
@@ -150,6 +150,8 @@ impl Reproduction<'_> {
                     *diverged = Some(error);
                     Ok(())
                 }
+                // What is scored of the row is scored again when the command goes on.
+                Err(ReproduceError::Evaluation(error)) if error.is_stopped() => Ok(()),
                 finished => finished.and_then(|()| self.report()),
             };
             if outcome.is_err() {

@@ -1,6 +1,8 @@
 //! The rows of a table: the configs of a folder, under one budget, with their seeds.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use super::{ExperimentConfig, ReproduceError};
 use crate::data::Dataset;
@@ -26,6 +28,25 @@ impl Row {
 pub struct Seeds {
     pub name: String,
     pub seeds: Vec<u64>,
+}
+
+impl FromStr for Seeds {
+    type Err = String;
+
+    /// From "NAME=SEED,SEED,..".
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected NAME=SEED,SEED,..., such as mine=1,2,3".to_string();
+        let (name, list) = text.split_once('=').ok_or_else(expected)?;
+        let seeds = list.split(',').map(|seed| seed.trim().parse().ok());
+        let seeds: Vec<u64> = seeds.collect::<Option<_>>().ok_or_else(expected)?;
+        if seeds.iter().collect::<BTreeSet<_>>().len() != seeds.len() {
+            return Err(format!("names a seed twice; {}", expected()));
+        }
+        Ok(Self {
+            name: name.trim().into(),
+            seeds,
+        })
+    }
 }
 
 /// The file of a folder of configs that holds what the paper prints.

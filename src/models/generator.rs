@@ -325,6 +325,9 @@ pub enum ModelError {
     NotFinite { what: String },
     #[error("{model}: {reason}")]
     Model { model: String, reason: String },
+    /// Whoever asked does not want the answer any more.
+    #[error("stopped")]
+    Stopped,
     /// The data cannot be brought into the model's numbers.
     #[error("{reason}")]
     Data { reason: String },

@@ -21,6 +21,7 @@ pub mod streams;
 pub mod task;
 #[cfg(feature = "papers")]
 pub mod transition;
+pub mod watched;
 pub mod weights;
 
 pub use generator::{Generator, ModelError, Motion, Request};

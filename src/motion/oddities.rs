@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::clip::Clip;
+use crate::counted::counted;
 
 /// A step at the beginning is a jump where its fastest joint goes this many times as far as any
 /// joint in any step after it.
@@ -40,9 +41,9 @@ fn collapsed_joints(clip: &Clip) -> Option<String> {
     }
     let dots = if collapsed.len() > NAMED { ", ..." } else { "" };
     Some(format!(
-        "the position channels of {} joints ({}{dots}) are 0 in every frame though their offsets are not: \
+        "the position channels of {} ({}{dots}) are 0 in every frame though their offsets are not: \
          they stand on their parents",
-        collapsed.len(),
+        counted(collapsed.len(), "joint"),
         collapsed[..collapsed.len().min(NAMED)].join(", ")
     ))
 }

@@ -308,8 +308,8 @@ impl<T: Real> Adam<T> {
             .iter()
             .map(|share| self.factors(steps, norm, learning_rate * share))
             .collect();
-        let finite = factors.iter().all(|factors| factors.rate.is_finite());
-        if !(learning_rate >= 0.0 && finite) {
+        let none = factors.iter().any(|factors| factors.rate.is_nan());
+        if none || learning_rate < 0.0 || !learning_rate.is_finite() {
             return Err(AdamError::Setting(SettingError {
                 key: "the learning rate of a step".into(),
                 value: learning_rate,

@@ -1,6 +1,7 @@
 //! The budget of a training in words, for the caption of its scores.
 
 use super::thousands;
+use crate::counted::counted;
 use crate::experiment::ExperimentConfig;
 use crate::optim::{AdamConfig, RateShape};
 use crate::run::{Manifest, RunState};
@@ -44,7 +45,10 @@ fn learning_rate(optimiser: &AdamConfig) -> String {
         return text;
     };
     if schedule.warmup_steps > 0 {
-        text += &format!(" after {} steps of warm-up", schedule.warmup_steps);
+        text += &format!(
+            " after {} of warm-up",
+            counted(schedule.warmup_steps, "step")
+        );
     }
     let shape = match schedule.shape {
         RateShape::Constant => return text,

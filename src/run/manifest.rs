@@ -6,6 +6,7 @@ use std::time::SystemTime;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::autograd::kernels::Isa;
 use crate::data::{Dataset, Recording};
 use crate::experiment::ExperimentConfig;
 use crate::models::Task;
@@ -67,6 +68,10 @@ pub struct Manifest {
     pub version: String,
     pub commit: Option<String>,
     pub cpu: String,
+    /// Instruction sets that its steps were computed with, each where it took over from the one
+    /// before. None where the run's version did not keep it.
+    #[serde(default)]
+    pub instructions: Vec<String>,
     pub threads: usize,
     /// UTC, RFC 3339.
     pub started: String,
@@ -133,6 +138,7 @@ impl Manifest {
             version,
             commit,
             cpu: cpu(),
+            instructions: vec![instructions()],
             threads,
             started: now(),
             finished: None,
@@ -154,6 +160,14 @@ impl Manifest {
 /// This moment, UTC, RFC 3339.
 pub(crate) fn now() -> String {
     humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
+}
+
+/// The instruction set of the kernels: the bits of a training follow from it.
+pub(crate) fn instructions() -> String {
+    match Isa::detected() {
+        Isa::Portable => format!("portable {}", std::env::consts::ARCH),
+        isa => isa.name().into(),
+    }
 }
 
 /// The CPU's name where the system tells it, else its architecture.

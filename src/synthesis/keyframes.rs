@@ -7,6 +7,7 @@ use std::str::FromStr;
 use ndarray::{Array2, ArrayView2, s};
 
 use super::{KeyframeSource, SequenceRequest, SynthesisError};
+use crate::counted::counted;
 use crate::data::{DataConfig, DataError};
 use crate::models::transition::DanceClip;
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
@@ -33,7 +34,7 @@ impl FromStr for FileKeyframe {
         let parts = || {
             let (rest, time) = text.rsplit_once('@')?;
             let (file, frame) = rest.rsplit_once(':')?;
-            let (frame, time) = (frame.parse().ok()?, time.parse().ok()?);
+            let (frame, time) = (frame.trim().parse().ok()?, time.trim().parse().ok()?);
             let file = Some(PathBuf::from(file)).filter(|file| !file.as_os_str().is_empty())?;
             Some(Self { file, frame, time })
         };
@@ -114,7 +115,8 @@ pub enum KeyframeError {
         source: Box<DataError>,
     },
     #[error(
-        "the result ends at frame {end}, but {file} ends {last} frames after its first keyframe; give earlier keyframes, or --keyframe only"
+        "the result ends at frame {end}, but {file} ends {} after its first keyframe; give earlier keyframes, or --keyframe only",
+        counted(*last, "frame")
     )]
     MotionEnds {
         file: PathBuf,
@@ -126,13 +128,14 @@ pub enum KeyframeError {
     )]
     TooLong { end: usize },
     #[error(
-        "--length gives {lengths} numbers for the {} transitions between {keyframes} keyframes; give one number, or one for each",
-        keyframes - 1
+        "--length gives {} for the {} between {keyframes} keyframes; give one number, or one for each",
+        counted(*lengths, "number"), counted(keyframes - 1, "transition")
     )]
     Lengths { lengths: usize, keyframes: usize },
     #[error(
-        "{file} has {found} frames, the result needs velocity factors of {needed} from its frame {first} on; give a longer clip or an \
-         earlier frame"
+        "{file} has {}, the result needs velocity factors of {needed} from its frame {first} on; give a longer clip or an \
+         earlier frame",
+        counted(*found, "frame")
     )]
     VelocityEnds {
         file: PathBuf,

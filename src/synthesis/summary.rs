@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error};
+use crate::counted::counted;
 
 /// The numbers of a generated sequence. Distances in cm, frames of the result.
 #[derive(Debug, Serialize)]
@@ -77,10 +78,13 @@ impl Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.model)?;
-        writeln!(f, "{} frames at {:.4} a second", self.frames, self.fps)?;
+        let frames = counted(self.frames, "frame");
+        writeln!(f, "{frames} at {:.4} a second", self.fps)?;
         for keyframe in &self.keyframes {
             write!(f, "keyframe at frame {}", keyframe.frame)?;
             match keyframe.missed {
+                // What would be printed as 0.0.
+                Some(Distances { max, .. }) if max < 0.05 => writeln!(f, ": the model met it")?,
                 Some(Distances { mean, max }) => writeln!(
                     f,
                     ": the model missed it by {mean:.1} cm in the mean, {max:.1} cm at most, and was bent onto it"

@@ -5,6 +5,7 @@ use std::fmt;
 use ndarray::ArrayView1;
 
 use super::SequenceRequest;
+use crate::counted::counted;
 use crate::models::generator::Condition;
 use crate::models::transition::DataRanges;
 use crate::motion::{PART_NAMES, PART_WEIGHTS};
@@ -65,8 +66,9 @@ impl fmt::Display for ControlWarning {
             }) => write!(
                 f,
                 "the root trajectory goes {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's fastest ({bound:.1} in 99.9 % of \
-                 its frames); too fast in {frames} frames",
-                asked / bound
+                 its frames); too fast in {}",
+                asked / bound,
+                counted(frames, "frame")
             ),
             Self::RootHeight(Excess {
                 frame,
@@ -76,10 +78,11 @@ impl fmt::Display for ControlWarning {
             }) => write!(
                 f,
                 "the root trajectory is at {asked:.0} cm height at frame {frame}, {:.0} cm {} the training data's {} ({bound:.0} in 99.9 % of its \
-                 frames); so in {frames} frames",
+                 frames); so in {}",
                 (asked - bound).abs(),
                 if asked > bound { "above" } else { "below" },
                 if asked > bound { "highest" } else { "lowest" },
+                counted(frames, "frame")
             ),
             Self::VelocityFactor(
                 part,
@@ -92,9 +95,10 @@ impl fmt::Display for ControlWarning {
             ) => write!(
                 f,
                 "the velocity factor of {} is {asked:.1} cm/frame at frame {frame}, {:.1} times the training data's highest ({bound:.1} in 99.9 % of \
-                 its frames); too high in {frames} frames",
+                 its frames); too high in {}",
                 PART_NAMES[part],
-                asked / bound
+                asked / bound,
+                counted(frames, "frame")
             ),
             Self::Contradiction(Excess {
                 frame,
@@ -104,7 +108,8 @@ impl fmt::Display for ControlWarning {
             }) => write!(
                 f,
                 "the velocity factor of the trunk is {asked:.1} cm/frame at frame {frame}, but the root trajectory alone makes it {bound:.1} or \
-                 more there; the two contradict each other in {frames} frames"
+                 more there; the two contradict each other in {}",
+                counted(frames, "frame")
             ),
             Self::Length { from, to } => write!(
                 f,

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::error::TrainingError;
 use super::step::{StepInput, Stepper};
 use crate::autograd::Parameters;
+use crate::counted::counted;
 use crate::experiment::ExperimentConfig;
 use crate::models::{Streams, Task};
 use crate::nn::Initialiser;
@@ -96,8 +97,12 @@ impl fmt::Display for StepSpeed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "training step, {} windows of {} frames, {} threads: {:.3} s, {:.0} frame-steps/s",
-            self.batch, self.frames, self.threads, self.seconds, self.frame_steps_per_second
+            "training step, {} of {}, {}: {:.3} s, {:.0} frame-steps/s",
+            counted(self.batch, "window"),
+            counted(self.frames, "frame"),
+            counted(self.threads, "thread"),
+            self.seconds,
+            self.frame_steps_per_second
         )
     }
 }

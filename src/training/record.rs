@@ -35,6 +35,11 @@ impl<'r> Record<'r> {
         let mut seconds_before = 0.0;
         if let Some(earlier) = run.manifest()? {
             manifest.started = earlier.started;
+            if trainer.steps_done() > 0 {
+                let before = earlier.instructions.into_iter();
+                manifest.instructions = before.chain(manifest.instructions).collect();
+                manifest.instructions.dedup();
+            }
             seconds_before = earlier.seconds;
         }
         let mut record = Self {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::trainer::Trainer;
 use crate::data::file_digest;
 use crate::run::checkpoint::{self, Checkpoint};
-use crate::run::{RunError, RunFolder};
+use crate::run::{RunError, RunFolder, manifest};
 
 /// Where a training goes on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub struct Resumed {
     pub steps: u64,
     /// Checkpoints that were newer and cannot be used, and why.
     pub damaged: Vec<String>,
+    /// That the end will have other bits than without the break, and why; none where it will not.
+    pub other_bits: Option<String>,
 }
 
 impl Trainer<'_> {
@@ -27,6 +29,20 @@ impl Trainer<'_> {
     pub fn resume(&mut self, run: &RunFolder) -> Result<Resumed, RunError> {
         self.resume_newest(run)
             .map_err(|error| run.or_other_version(error))
+    }
+
+    /// What is to be known where the steps so far were computed with another instruction set.
+    fn other_bits(&self, run: &RunFolder) -> Result<Option<String>, RunError> {
+        let manifest = run.manifest()?;
+        let last = manifest.as_ref().and_then(|it| it.instructions.last());
+        let now = manifest::instructions();
+        let other = last.filter(|last| **last != now && self.steps_done() > 0);
+        Ok(other.map(|last| {
+            format!(
+                "the steps so far were computed with the instruction set {last}, those to come \
+                 with {now}: the end will not have the bits of a training on one CPU"
+            )
+        }))
     }
 
     fn resume_newest(&mut self, run: &RunFolder) -> Result<Resumed, RunError> {
@@ -42,6 +58,7 @@ impl Trainer<'_> {
                     return Ok(Resumed {
                         steps: self.steps_done(),
                         damaged,
+                        other_bits: self.other_bits(run)?,
                     });
                 }
                 Err(problem) => {
@@ -51,7 +68,11 @@ impl Trainer<'_> {
             }
         }
         match damaged.is_empty() {
-            true => Ok(Resumed { steps: 0, damaged }),
+            true => Ok(Resumed {
+                steps: 0,
+                damaged,
+                other_bits: None,
+            }),
             false => Err(RunError::Refused(format!(
                 "no checkpoint of {} can be used: {}",
                 run.path().display(),

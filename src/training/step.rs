@@ -7,6 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::error::TrainingError;
 use crate::autograd::{AutogradError, BufferId, Gradients, Parameters, Tape, Workspace};
+use crate::counted::counted;
 use crate::models::{Step, Streams};
 use crate::optim::{Adam, AdamError};
 
@@ -35,7 +36,12 @@ pub struct Losses {
 /// The system gives no more threads.
 pub fn pool(threads: usize) -> Result<ThreadPool, TrainingError> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|cause| TrainingError::Refused(format!("no pool of {threads} threads: {cause}")))
+    pool.map_err(|cause| {
+        TrainingError::Refused(format!(
+            "no pool of {}: {cause}",
+            counted(threads, "thread")
+        ))
+    })
 }
 
 /// Threads and buffers that one step leaves for the next.

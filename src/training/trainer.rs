@@ -1,7 +1,7 @@
 //! The loop: from a config and a data set to trained weights.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::error::TrainingError;
 use super::record::Record;
@@ -189,6 +189,38 @@ impl<'d> Trainer<'d> {
             record.end(self, RunState::Finished)?;
         }
         Ok(Outcome::Finished)
+    }
+
+    /// About how long the steps that are left take: as the one in their middle does, which is tried
+    /// on copies of the weights and the optimiser. None where none is left, or it fails.
+    pub fn expected(&mut self) -> Option<Duration> {
+        let done = self.steps_done();
+        let left = self
+            .task
+            .steps()
+            .checked_sub(done)
+            .filter(|&left| left > 0)?;
+        let done = done + left / 2;
+        let step = self.task.step(done);
+        let input = StepInput {
+            step: &*step,
+            streams: self.streams,
+            done,
+        };
+        let (mut parameters, mut adam) = (self.parameters.clone(), self.adam.clone());
+        let mut seconds = || {
+            let start = Instant::now();
+            let result = self.stepper.step(input, &mut parameters, &mut adam);
+            result.ok().map(|_| start.elapsed().as_secs_f64())
+        };
+        // The first fills the buffers; where it is short, a second is worth its time.
+        let mut taken = seconds()?;
+        if taken < 1.0 {
+            taken = seconds()?;
+        }
+        let left = self.task.frame_steps().saturating_sub(self.frame_steps);
+        let seconds = taken * left as f64 / step.frames().max(1) as f64;
+        Duration::try_from_secs_f64(seconds).ok()
     }
 
     fn step(&mut self) -> Result<StepReport, TrainingError> {

@@ -1,6 +1,7 @@
 //! Scores on validation clips while a training goes on: how much more the budget would buy.
 
 use super::error::TrainingError;
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset, Recording};
 use crate::evaluation::{EvaluationError, EvaluationOptions, Protocol, Scores};
 use crate::experiment::ExperimentConfig;
@@ -44,7 +45,8 @@ impl<'d> Validation<'d> {
         match lengths.find(|&&length| length >= longest) {
             Some(length) => Err(TrainingError::Refused(format!(
                 "validation.lengths has {length}, but the longest of the validation clips has \
-                 {longest} frames; give lengths of fewer frames"
+                 {}; give lengths of fewer frames",
+                counted(longest, "frame")
             ))),
             None => Ok(Some(Self {
                 dataset,

@@ -393,7 +393,7 @@ fn clips_other_than_the_test_clips_are_named_in_the_json_and_have_files_of_their
         command
     };
     let of_validation = scored("validation", "0.25").assert().success();
-    of_validation.stdout(contains("on 1 validation clips, 180 frames"));
+    of_validation.stdout(contains("on 1 validation clip, 180 frames"));
     let scores = json(&file);
     assert_eq!(scores["clips"], "validation");
     assert!(scores["equations"]["lrp"]["avg"].is_number());

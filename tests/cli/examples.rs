@@ -1,6 +1,6 @@
 //! The programs of `examples/`, which `cargo test` builds.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use assert_cmd::Command;
 use predicates::str::contains;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::generated_data::write_clips;
 
 fn example(name: &str) -> Command {
-    let binary = PathBuf::from(assert_cmd::cargo::cargo_bin("keydance"));
+    let binary = assert_cmd::cargo::cargo_bin("keydance");
     Command::new(binary.with_file_name("examples").join(name))
 }
 

@@ -102,6 +102,34 @@ fn a_model_that_knows_nothing_still_passes_through_the_keyframes_in_the_files_ow
     assert_eq!(summary["keyframes"][0]["missed"], Value::Null);
 }
 
+#[test]
+fn blanks_in_a_list_are_no_part_of_it_and_a_keyframe_that_is_met_is_no_miss() {
+    let out = TempDir::new().unwrap();
+    let file = out.path().join("dance.bvh");
+    let with = |lists: &[&str]| {
+        let mut command = generate("interpolation.toml");
+        command
+            .arg("--motion")
+            .arg(&CLIPS[0])
+            .arg("--out")
+            .arg(&file);
+        command.args(lists).assert()
+    };
+    with(&["--keyframes", "20, 80 , 140", "--length", " 60, 60"])
+        .success()
+        .stdout(
+            contains("121 frames at")
+                .and(contains("keyframe at frame 60: the model met it\n"))
+                .and(contains("missed").not()),
+        );
+    for (lists, words) in [
+        (["--keyframes", "20,,80"], "whole numbers from 0"),
+        (["--keyframes", "20,-80"], "whole numbers from 0"),
+    ] {
+        with(&lists).failure().stderr(contains(words));
+    }
+}
+
 /// The velocity factors and root positions that a viewer's page says were asked for, a row a frame.
 fn asked(page: &Path) -> (Vec<[f64; 5]>, Vec<[f64; 3]>) {
     let data = page_data(&fs::read_to_string(page).unwrap());
@@ -486,7 +514,7 @@ fn controls_that_cannot_be_used_are_named() {
     );
     refused(
         with(&["--velocity-csv", &factors, "--length", "1"]),
-        "has rows for 1 frames; the result has 3",
+        "has rows for 1 frame; the result has 3",
     );
     refused(
         with(&["--velocity-csv", &factors, "--velocity-from", "a.bvh"]),

@@ -28,6 +28,7 @@ mod evaluate;
 mod examples;
 mod figures;
 mod generate;
+mod help;
 mod odd_files;
 mod outputs;
 mod report;

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead as _, BufReader};
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -12,13 +13,15 @@ use std::sync::LazyLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use keydance::autograd::kernels::Isa;
 use keydance::run::checkpoint::list;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::folders::copy;
+use crate::generated_data::write_clips;
 use crate::small_run::{SmallRun, digest, keydance, stderr};
 
 /// A schedule that no test waits to the end of.
@@ -400,6 +403,118 @@ fn mistakes_in_the_command_or_its_files_have_exit_codes_of_their_own() {
     let again = small.train(&STOPPED.run(), &LONG);
     assert_eq!(again.status.code(), Some(1));
     assert!(stderr(&again).contains("holds a run already; go on with --resume"));
+}
+
+/// Clips that take seconds to score a model on, and a folder with one config of a small one.
+static LONG_EVALUATION: LazyLock<TempDir> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    for name in ["data", "configs"] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    write_clips(&folder.path().join("data"), 4000, 3);
+    let config = "name = 'small'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'pan2021'\n\
+        hidden = 32\ncode = 16\nheads = 2\nfeed_forward = 16\n[schedule]\nmax_len = 6\n\
+        frame_steps = 200\nbatch_size = 8\nshards = 1\n";
+    fs::write(folder.path().join("configs/small.toml"), config).unwrap();
+    folder
+});
+
+/// A command about that model, in its folder, its output in pipes.
+fn about_long_evaluation(arguments: &[&str]) -> Command {
+    let mut command = keydance();
+    command
+        .current_dir(LONG_EVALUATION.path())
+        .args(arguments)
+        .args(["--data", "data", "--threads", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Sends a signal once a command says that it evaluates. How long it takes to end, how it does, and
+/// what it says from there on.
+fn stopped_while_evaluating(mut command: Command, signal: &str) -> (Duration, Option<i32>, String) {
+    let mut child = command.spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let evaluates = |line: &std::io::Result<String>| line.as_ref().unwrap().contains("evaluating");
+    let progress = lines.find(evaluates).unwrap().unwrap();
+    assert!(
+        progress.contains(" frames  ") && progress.ends_with(" left"),
+        "{progress}"
+    );
+    let begun = Instant::now();
+    kill(&child, signal);
+    let said: Vec<String> = lines.map(Result::unwrap).collect();
+    let code = child.wait().unwrap().code();
+    (begun.elapsed(), code, said.join("\n"))
+}
+
+#[test]
+fn ctrl_c_and_sigterm_end_an_evaluation_and_the_same_command_goes_on() {
+    let folder = LONG_EVALUATION.path();
+    let rows = ["reproduce", "configs", "--out", "results", "--runs", "runs"];
+    let begun = Instant::now();
+    let (took, code, said) = stopped_while_evaluating(about_long_evaluation(&rows), "-INT");
+    let in_all = begun.elapsed();
+    assert_eq!(code, Some(130), "{said}");
+    // Chunks of windows that were begun are ended.
+    assert!(took < Duration::from_secs(5), "{took:?} of {in_all:?}");
+    assert!(said.contains("stopped and saved; go on with"), "{said}");
+    let weights = fs::metadata(folder.join("runs/small/weights.safetensors")).unwrap();
+    assert!(!folder.join("results/small/evaluation.json").exists());
+    let run = folder.join("runs/small");
+    let run = run.to_str().unwrap();
+    let score = ["evaluate", run, "--json", "scores.json"];
+    let (took, code, said) = stopped_while_evaluating(about_long_evaluation(&score), "-TERM");
+    assert_eq!(code, Some(130), "{said}");
+    assert!(took < Duration::from_secs(5), "{took:?}");
+    assert!(said.contains("nothing is written"), "{said}");
+    assert!(!folder.join("scores.json").exists());
+
+    let output = about_long_evaluation(&rows).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(folder.join("results/small/evaluation.json").exists());
+    // Nothing was trained again.
+    let again = fs::metadata(folder.join("runs/small/weights.safetensors")).unwrap();
+    assert_eq!(again.modified().unwrap(), weights.modified().unwrap());
+}
+
+#[test]
+fn a_run_that_goes_on_with_another_instruction_set_says_so_and_keeps_both() {
+    let small = SmallRun::new();
+    let run = small.path("run");
+    let train = |set: &str, more: &[&str]| {
+        let mut command = keydance();
+        let arguments = small.train_arguments(&run, more);
+        command.args(arguments).env("KEYDANCE_ISA", set).output()
+    };
+    let portable = format!("portable {}", std::env::consts::ARCH);
+    let finished = train("portable", &[]).unwrap();
+    assert!(finished.status.success(), "{}", stderr(&finished));
+    assert_eq!(manifest(&run)["instructions"], json!([portable]));
+    // As if it had been killed before its end.
+    fs::remove_file(run.join("weights.safetensors")).unwrap();
+    let newest = list(&run.join("checkpoints")).unwrap().pop().unwrap().1;
+    fs::remove_dir_all(newest).unwrap();
+    let same = train("portable", &["--resume"]).unwrap();
+    assert!(
+        !stderr(&same).contains("instruction set"),
+        "{}",
+        stderr(&same)
+    );
+    let other = Isa::ALL.into_iter().find(|isa| isa.is_available());
+    let other = other.unwrap().name();
+    if other == "portable" {
+        return;
+    }
+    fs::remove_file(run.join("weights.safetensors")).unwrap();
+    let newest = list(&run.join("checkpoints")).unwrap().pop().unwrap().1;
+    fs::remove_dir_all(newest).unwrap();
+    let text = stderr(&train(other, &["--resume"]).unwrap());
+    for words in ["warning: ", &portable, other, "bits"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert_eq!(manifest(&run)["instructions"], json!([portable, other]));
 }
 
 /// Kills trainings with SIGKILL at random moments of their whole life, `kills` times together, and

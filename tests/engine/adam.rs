@@ -184,20 +184,10 @@ fn a_gradient_that_is_not_finite_changes_nothing_and_is_named() {
 }
 
 #[test]
-fn a_learning_rate_that_is_none_or_gradients_of_other_parameters_change_nothing() {
+fn gradients_of_other_parameters_change_nothing() {
     let mut parameters = parameters::<f32>(&[&[1.0, 2.0], &[3.0; 20]]);
     let mut adam = Adam::new(AdamConfig::default(), &parameters).unwrap();
     let before = (weights(&parameters), adam.clone());
-    let config = AdamConfig {
-        learning_rate: 1e300,
-        ..AdamConfig::default()
-    };
-    let mut ones = gradients(&parameters, |_, _| 1.0);
-    let step = Adam::new(config, &parameters)
-        .unwrap()
-        .step(&mut parameters, &mut ones);
-    let error = step.unwrap_err().to_string();
-    assert!(error.contains("learning rate"), "{error}");
     let mut others: Vec<Parameters<f32>> = vec![Parameters::new()];
     for sizes in [vec![2], vec![2, 19], vec![20, 2], vec![2, 20, 1]] {
         let values: Vec<Vec<f64>> = sizes.iter().map(|&size| vec![0.0; size]).collect();

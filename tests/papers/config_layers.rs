@@ -157,6 +157,17 @@ fn a_bad_value_names_key_and_remedy() {
             ["schedule.fraction = NaN", "above 0"],
         ),
         (
+            "schedule={ fraction = 0.5, frame_steps = 1000 }",
+            [
+                "schedule.frame_steps = 1000",
+                "schedule.fraction = 1 leaves",
+            ],
+        ),
+        (
+            "schedule.frame_steps=0",
+            ["schedule.frame_steps = 0", "at least 1"],
+        ),
+        (
             "schedule.shards=129",
             ["schedule.shards = 129", "from 1 to 128"],
         ),

@@ -77,6 +77,26 @@ fn any_config() -> impl Strategy<Value = ScheduleConfig> {
         )
 }
 
+#[test]
+fn so_many_frame_steps_are_trained_of_however_many_clips() {
+    let config = ScheduleConfig {
+        max_len: 50,
+        max_len_step: 5,
+        batch_size: 32,
+        frame_steps: Some(100_000),
+        ..ScheduleConfig::default()
+    };
+    for clips in [6, 24, 100] {
+        let trained = schedule(&vec![900; clips], &config, 1);
+        assert!(trained.whole_frame_steps() > 1_000_000);
+        let off = trained.frame_steps().abs_diff(100_000);
+        // A batch, and that long windows are not dealt as often as short ones to the frame.
+        assert!(off < 5_000, "{clips} clips: {}", trained.frame_steps());
+    }
+    let all = schedule(&[60], &config, 1);
+    assert_eq!(all.frame_steps(), all.whole_frame_steps());
+}
+
 proptest! {
     #[test]
     fn every_window_of_an_epoch_is_trained_exactly_once(

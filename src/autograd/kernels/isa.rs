@@ -64,7 +64,8 @@ impl Isa {
         }
     }
 
-    fn name(self) -> &'static str {
+    /// What `KEYDANCE_ISA` calls it.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Avx512 => "avx512",
             Self::Avx2 => "avx2",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::list::within;
 use crate::synthesis::keyframes::{FileKeyframe, KeyframeChoice, LONGEST};
 
 #[derive(Debug, Args)]
@@ -14,12 +15,8 @@ pub struct KeyframeArgs {
     motion: Option<PathBuf>,
     /// Frames of --motion that are keyframes, ascending, such as 120,180,260; the first becomes
     /// frame 0 of the result, the others keep their distances
-    #[arg(
-        long,
-        value_name = "FRAMES",
-        value_delimiter = ',',
-        requires = "motion"
-    )]
+    #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion",
+        value_parser = within(0..=usize::MAX))]
     keyframes: Vec<usize>,
     /// A frame of any file as a keyframe, and its frame in the result, such as jump.bvh:75@60; may
     /// be repeated
@@ -31,7 +28,7 @@ pub struct KeyframeArgs {
     /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such
     /// as 100,250
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion", conflicts_with = "keyframe",
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(LONGEST)))]
+        value_parser = within(1..=LONGEST))]
     pub length: Vec<u32>,
 }
 

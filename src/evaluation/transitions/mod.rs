@@ -7,6 +7,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use super::protocol::{EvaluationError, EvaluationOptions};
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
 use crate::models::transition::{DanceClip, Window, window_features, windows};
 use crate::models::{Generator, ModelError};
@@ -126,9 +127,10 @@ impl TransitionScoring {
             }
             warnings.extend(skipped.into_iter().map(|clip| {
                 format!(
-                    "{} has {} frames, fewer than a window of {needed} (N = {length}): left out of \
-                     the scores at this length",
-                    clips[clip].name, clip_frames[clip],
+                    "{} has {}, fewer than a window of {needed} (N = {length}): left out of the \
+                     scores at this length",
+                    clips[clip].name,
+                    counted(clip_frames[clip], "frame"),
                 )
             }));
             let chunks = cut.par_chunks(self.chunk.max(1));

@@ -10,6 +10,7 @@ use super::ModelConfig;
 use super::Standardisation;
 use super::{Batch, Network, PoseWindows};
 use crate::autograd::{Parameters, Tape, Workspace};
+use crate::counted::counted;
 use crate::models::ModelError;
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
@@ -48,7 +49,7 @@ impl MeasuredGeneration {
             .build()
             .map_err(|cause| ModelError::Model {
                 model: "generation".into(),
-                reason: format!("no pool of {threads} threads: {cause}"),
+                reason: format!("no pool of {}: {cause}", counted(threads, "thread")),
             })?;
         let count = threads.min(batch).max(1);
         let parts = (0..count)

@@ -44,7 +44,7 @@ pub struct Schedule {
 impl Schedule {
     /// Counts the schedule for training clips of these numbers of frames.
     ///
-    /// With a `fraction` below 1 whole batches are dealt: the windows due of a length that fill
+    /// With a `fraction` below 1, or `frame_steps` in its place, whole batches are dealt: the windows due of a length that fill
     /// none go to the next length, so that a small share has steps of `batch_size` windows as any
     /// other, and the total is right to one batch.
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
@@ -67,31 +67,36 @@ impl Schedule {
             .collect();
         let growth = config.max_len.saturating_sub(config.min_len);
         let epochs = growth.div_ceil(config.max_len_step.max(1)) + 1;
-        let (mut all, mut taken, mut steps) = (0usize, 0usize, 0u64);
-        for epoch in 0..epochs {
+        let lengths = |epoch: usize| {
             let longest = (config.min_len + config.max_len_step * epoch).min(config.max_len);
             let shortest =
                 config.min_len + config.min_len_step * (epoch / config.min_len_every.max(1));
+            shortest.min(longest)..=longest
+        };
+        let frames = |length: usize| (available[length] * length) as u64;
+        schedule.whole_frame_steps = (0..epochs).flat_map(lengths).map(frames).sum();
+        let whole = schedule.whole_frame_steps.max(1) as f64;
+        let fraction = match config.frame_steps {
+            Some(frame_steps) => (frame_steps as f64 / whole).min(1.0),
+            None => config.fraction,
+        };
+        let (mut all, mut taken, mut steps) = (0usize, 0usize, 0u64);
+        for epoch in 0..epochs {
             let mut shares = Vec::new();
-            for (length, &n) in available
-                .iter()
-                .enumerate()
-                .take(longest + 1)
-                .skip(shortest.min(longest))
-            {
+            for length in lengths(epoch) {
+                let n = available[length];
                 if n == 0 && !schedule.skipped_lengths.contains(&length) {
                     schedule.skipped_lengths.push(length);
                 }
                 all += n;
-                let due = (all as f64 * config.fraction).floor() as usize - taken;
-                let count = if config.fraction < 1.0 {
+                let due = (all as f64 * fraction).floor() as usize - taken;
+                let count = if fraction < 1.0 {
                     (due - due % schedule.batch_size).min(n)
                 } else {
                     due
                 };
                 taken += count;
                 schedule.frame_steps += (count * length) as u64;
-                schedule.whole_frame_steps += (n * length) as u64;
                 schedule.reference_steps += n.div_ceil(REFERENCE_BATCH) as u64;
                 steps += count.div_ceil(schedule.batch_size) as u64;
                 if count > 0 {

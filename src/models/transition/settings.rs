@@ -61,6 +61,10 @@ pub struct ScheduleConfig {
     /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths
     /// of every epoch, below 1 in whole batches, see [`super::Schedule::new`].
     pub fraction: f64,
+    /// In place of `fraction`: about how many frames are trained, of however many clips; the whole
+    /// schedule where it has no more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_steps: Option<u64>,
 }
 
 impl Default for ScheduleConfig {
@@ -74,6 +78,7 @@ impl Default for ScheduleConfig {
             batch_size: 128,
             shards: 4,
             fraction: 1.0,
+            frame_steps: None,
         }
     }
 }
@@ -135,12 +140,8 @@ impl ModelSettings for TransitionSettings {
     }
 
     fn budget_note(&self) -> String {
-        let ScheduleConfig {
-            fraction,
-            batch_size,
-            ..
-        } = self.schedule;
-        format!("schedule.fraction {fraction}, batch size {batch_size}")
+        let schedule = &self.schedule;
+        format!("{}, batch size {}", schedule.budget(), schedule.batch_size)
     }
 
     fn rate_groups(&self) -> &'static [&'static str] {
@@ -269,6 +270,33 @@ impl ScheduleConfig {
             ValueError::unless(valid, format!("schedule.{key}"), value, expected)?;
         }
         let fraction = self.fraction;
-        ValueError::unless(is_share(fraction), "schedule.fraction", fraction, SHARE)
+        ValueError::unless(is_share(fraction), "schedule.fraction", fraction, SHARE)?;
+        let Some(frame_steps) = self.frame_steps else {
+            return Ok(());
+        };
+        let key = "schedule.frame_steps";
+        ValueError::unless(frame_steps > 0, key, frame_steps, "at least 1")?;
+        let expected = format!(
+            "one of the two, not schedule.fraction = {fraction} beside it; schedule.fraction = 1 \
+             leaves it to {key}"
+        );
+        ValueError::unless(fraction == 1.0, key, frame_steps, expected)
+    }
+
+    /// The key that says how much of the schedule is trained.
+    pub(super) fn budget_key(&self) -> &'static str {
+        match self.frame_steps {
+            Some(_) => "schedule.frame_steps",
+            None => "schedule.fraction",
+        }
+    }
+
+    /// The same with its value, for a message or a caption.
+    pub(super) fn budget(&self) -> String {
+        let key = self.budget_key();
+        match self.frame_steps {
+            Some(frame_steps) => format!("{key} {frame_steps}"),
+            None => format!("{key} {}", self.fraction),
+        }
     }
 }

@@ -15,6 +15,7 @@ use super::{
     Batch, BatchPlan, DanceClip, DataRanges, Forcing, Network, Schedule, Standardisation, Window,
 };
 use crate::autograd::{AutogradError, Parameters, Tape};
+use crate::counted::counted;
 use crate::models::settings::TaskSetting;
 use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
 
@@ -53,12 +54,14 @@ impl TransitionTask {
         if schedule.steps() == 0 {
             return Err(ModelError::Data {
                 reason: format!(
-                    "the schedule has no step: no window of {} to {} frames at fraction {} of {} training clips, the longest \
-                     of {longest} frames; raise schedule.fraction, or lower schedule.batch_size or schedule.min_len",
+                    "the schedule has no step: no window of {} to {} frames at {} of {}, the longest of {}; raise \
+                     {}, or lower schedule.batch_size or schedule.min_len",
                     settings.schedule.min_len,
                     settings.schedule.max_len,
-                    settings.schedule.fraction,
-                    frames.len(),
+                    settings.schedule.budget(),
+                    counted(frames.len(), "training clip"),
+                    counted(longest, "frame"),
+                    settings.schedule.budget_key(),
                 ),
             });
         }
@@ -167,14 +170,18 @@ impl Task<f32> for TransitionTask {
     }
 
     fn summary(&self) -> Option<String> {
-        Some(format!("{} epochs", self.schedule.epochs()))
+        Some(counted(self.schedule.epochs(), "epoch"))
     }
 
     fn warnings(&self) -> Vec<String> {
         let skipped = self.schedule.skipped_lengths();
         let ends = skipped.first().zip(skipped.last());
         let warning = ends.map(|(first, last)| {
-            format!("no training clip is long enough for transitions of {first} to {last} frames: skipped")
+            let lengths = match first == last {
+                true => counted(*first, "frame"),
+                false => format!("{first} to {last} frames"),
+            };
+            format!("no training clip is long enough for transitions of {lengths}: skipped")
         });
         warning.into_iter().collect()
     }
@@ -253,9 +260,9 @@ impl Step<f32> for TransitionStep<'_> {
 
     fn describe(&self) -> String {
         format!(
-            "{} windows of {} frames",
-            self.plan.windows.len(),
-            self.plan.length
+            "{} of {}",
+            counted(self.plan.windows.len(), "window"),
+            counted(self.plan.length, "frame")
         )
     }
 }

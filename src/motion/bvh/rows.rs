@@ -5,6 +5,7 @@ use ndarray::Array2;
 use super::document::LONGEST_FRAME;
 use super::error::BvhError;
 use super::scanner::{Scanner, quoted};
+use crate::counted::counted;
 
 /// Reads what follows the word MOTION: the frame time in seconds and the rows,
 /// `[frames, channels]`.
@@ -56,14 +57,16 @@ fn rows(scanner: &mut Scanner, frames: usize, channels: usize) -> Result<Array2<
     let mut read = 0;
     while let Some(line) = scanner.full_line() {
         if read == frames {
-            let expected =
-                format!("the end of the file after the {frames} rows that \"Frames:\" announces");
+            let expected = format!(
+                "the end of the file after the {} that \"Frames:\" announces",
+                counted(frames, "row")
+            );
             return Err(scanner.error(expected, quoted(line)));
         }
         let found = line.split_whitespace().count();
         if found != channels {
             return Err(scanner.error(
-                format!("{channels} values in a row, one a channel"),
+                format!("{} in a row, one a channel", counted(channels, "value")),
                 found.to_string(),
             ));
         }
@@ -74,7 +77,7 @@ fn rows(scanner: &mut Scanner, frames: usize, channels: usize) -> Result<Array2<
     }
     let ended = || {
         scanner.error(
-            format!("{frames} rows, as \"Frames:\" announces"),
+            format!("{}, as \"Frames:\" announces", counted(frames, "row")),
             format!("the end of the file after {read}"),
         )
     };

@@ -13,6 +13,7 @@ pub use showcase::Showcase;
 use std::path::Path;
 
 use super::ReportError;
+use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
 use crate::evaluation::{EvaluatedData, EvaluationRecord, TableRow, Tables};
 use crate::run::{RunFolder, check_output_folder, remove_file, replace_file, write_json};
@@ -91,11 +92,11 @@ pub fn write_scores(
 ) -> Result<(), ReportError> {
     let choreography = &settings.choreography;
     let subject = format!(
-        "{} of {} generated clips of {} frames (seed {}), the paper's on its own data: not \
+        "{} of {} of {} (seed {}), the paper's on its own data: not \
          comparable",
         dataset.test.len(),
-        choreography.clips,
-        choreography.frames_per_clip,
+        counted(choreography.clips, "generated clip"),
+        counted(choreography.frames_per_clip, "frame"),
         choreography.seed
     );
     replace_file(&folder.join(TABLES), tables.markdown(rows, &subject))?;

@@ -1,5 +1,6 @@
 //! What the demo generates and trains.
 
+use crate::counted::counted;
 use crate::data::choreography::{ChoreographyConfig, generate};
 use crate::data::{Dataset, Recording};
 use crate::experiment::ExperimentConfig;
@@ -49,8 +50,9 @@ impl DemoSettings {
         };
         let ((train, frames), (test, test_frames)) = (of(&dataset.train), of(&dataset.test));
         format!(
-            "{train} clips to train on ({frames} frames), {test} to test on ({test_frames} frames), \
-             generated from seed {}",
+            "{} to train on ({frames} frames), {test} to test on ({test_frames} frames), generated \
+             from seed {}",
+            counted(train, "clip"),
             self.choreography.seed
         )
     }

@@ -14,6 +14,7 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde::Serialize;
 
 use super::FigureError;
+use crate::counted::counted;
 use crate::motion::contact::{FOOT_JOINTS, in_contact};
 use crate::motion::placement::{vector, world_positions};
 use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
@@ -152,11 +153,11 @@ impl Viewer {
         let frames = self.frames();
         let keyframes = match self.keyframes.len() {
             0 => String::new(),
-            1 => ", 1 keyframe".into(),
-            count => format!(", {count} keyframes"),
+            count => format!(", {}", counted(count, "keyframe")),
         };
         format!(
-            "{frames} frames, {:.1} s at {:.0} fps{keyframes}",
+            "{}, {:.1} s at {:.0} fps{keyframes}",
+            counted(frames, "frame"),
             (frames - 1) as f64 * self.frame_time,
             1.0 / self.frame_time
         )

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use csv::{Position, ReaderBuilder, Trim};
 use ndarray::Array2;
 
+use crate::counted::counted;
 use crate::motion::PART_NAMES;
 
 /// Numbers beyond this are mistakes.
@@ -50,7 +51,7 @@ pub enum TableError {
         expected: usize,
         found: f64,
     },
-    #[error("{file} has rows for {found} frames; the result has {frames} (0 to {})", frames - 1)]
+    #[error("{file} has rows for {}; the result has {frames} (0 to {})", counted(*found, "frame"), frames - 1)]
     TooShort {
         file: PathBuf,
         found: usize,

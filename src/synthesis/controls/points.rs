@@ -6,6 +6,7 @@ use glam::DVec3;
 use ndarray::Array2;
 
 use super::{Speed, smooth_curve};
+use crate::counted::counted;
 use crate::synthesis::SequenceRequest;
 
 /// Numbers beyond this are mistakes: 10 km in cm.
@@ -46,9 +47,9 @@ impl FromStr for Points {
                 .collect::<Result<_, String>>()?;
             if *columns.get_or_insert(numbers.len()) != numbers.len() {
                 return Err(format!(
-                    "point {} has {} numbers, those before it have another count",
+                    "point {} has {}, those before it have another count",
                     index + 1,
-                    numbers.len()
+                    counted(numbers.len(), "number")
                 ));
             }
             points.push(match numbers[..] {
@@ -56,9 +57,9 @@ impl FromStr for Points {
                 [x, y, z] => DVec3::new(x, y, z),
                 _ => {
                     return Err(format!(
-                        "point {} has {} numbers; expected x,z or x,y,z",
+                        "point {} has {}; expected x,z or x,y,z",
                         index + 1,
-                        numbers.len()
+                        counted(numbers.len(), "number")
                     ));
                 }
             });

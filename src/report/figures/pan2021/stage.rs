@@ -4,6 +4,7 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
+use crate::counted::counted;
 use crate::models::transition::{DanceClip, check_frames, window_features};
 use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
@@ -84,10 +85,10 @@ impl<'d> Stage<'d> {
             };
             if start > last {
                 return Err(ReportError::Refused(format!(
-                    "--start {start}: {} has {} frames, so a window of {needed} starts at frame \
+                    "--start {start}: {} has {}, so a window of {needed} starts at frame \
                      {last} at the latest",
                     clip.name,
-                    clip.frames()
+                    counted(clip.frames(), "frame")
                 )));
             }
             windows.push(ShownWindow {

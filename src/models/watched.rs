@@ -1,0 +1,57 @@
+//! A model whose answers are watched, and which stops when it is told to.
+
+use ndarray::Array2;
+
+use super::generator::Needs;
+use super::{Generator, ModelError, Motion, Request};
+
+/// A model that asks before each answer whether to go on, and says how many frames it answered.
+pub struct Watched<'a> {
+    pub model: &'a dyn Generator,
+    /// Where it is true, answers are [`ModelError::Stopped`].
+    pub stopped: &'a (dyn Fn() -> bool + Sync),
+    /// Is told the frames of each answer, by several threads at a time.
+    pub answered: &'a (dyn Fn(u64) + Sync),
+}
+
+impl Watched<'_> {
+    fn watch<T>(
+        &self,
+        requests: &[Request],
+        answer: impl FnOnce() -> Result<T, ModelError>,
+    ) -> Result<T, ModelError> {
+        if (self.stopped)() {
+            return Err(ModelError::Stopped);
+        }
+        let answer = answer()?;
+        (self.answered)(requests.iter().map(|it| it.frames as u64).sum());
+        Ok(answer)
+    }
+}
+
+impl Generator for Watched<'_> {
+    fn name(&self) -> &str {
+        self.model.name()
+    }
+
+    fn needs(&self) -> Needs {
+        self.model.needs()
+    }
+
+    fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
+        self.watch(requests, || self.model.generate(requests))
+    }
+
+    fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
+        self.watch(requests, || self.model.raw(requests))
+    }
+
+    fn log_likelihoods(
+        &self,
+        requests: &[Request],
+        truths: &[Motion],
+    ) -> Result<Vec<f64>, ModelError> {
+        let answer = || self.model.log_likelihoods(requests, truths);
+        self.watch(requests, answer)
+    }
+}
