@@ -10,8 +10,8 @@ use clap::Args;
 
 use super::clip_choice::ClipChoice;
 use super::list::within;
-use super::notice::{notice, warn};
-use super::stop::{Stop, interrupted};
+use super::notice::warn;
+use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::counted::counted;
@@ -94,7 +94,11 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     };
     let protocols = config.model.protocols(&config.data, &options);
     let protocols = choose(protocols, &args.protocol, !args.lengths.is_empty())?;
-    let (pool, stop) = (args.threads.pool()?, Stop::on_signal()?);
+    let farewell = format!(
+        "stopped, nothing is written; begin again with\n  {}",
+        command()
+    );
+    let (pool, stop) = (args.threads.pool()?, Stop::on_signal(farewell)?);
     let model = &*subject.model;
     let mut scores = Vec::new();
     for protocol in &protocols {
@@ -102,8 +106,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
             .install(|| evaluate_watched(&**protocol, model, &dataset, part, true, Some(&stop)))
         {
             Err(error) if error.is_stopped() => {
-                notice("stopped; nothing is written, the same command begins again");
-                return Ok(interrupted());
+                return Ok(interrupted(&stop.farewell));
             }
             evaluation => evaluation?,
         };

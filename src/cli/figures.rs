@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::notice::warn;
 use super::threads::Threads;
+use crate::counted::counted;
 use crate::data::Dataset;
 use crate::models::registry;
 use crate::report::figures::FigureRequest;
@@ -95,9 +96,9 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     };
     let drawn = args.threads.pool()?.install(|| draw(&asked))?;
     let about = format!(
-        "{} on {} test clips of the data with digest {}.",
+        "{} on {} of the data with digest {}.",
         subject.what,
-        dataset.test.len(),
+        counted(dataset.test.len(), "test clip"),
         dataset.digest
     );
     drawn.write(&args.out, &about)?;

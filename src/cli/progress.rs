@@ -66,7 +66,7 @@ impl Meter {
     }
 
     /// Ends without a trace of the bar.
-    pub fn clear(mut self) {
+    pub fn clear(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }

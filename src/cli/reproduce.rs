@@ -11,7 +11,7 @@ use clap::Args;
 use super::list::name;
 use super::notice::{notice, warn};
 use super::progress::Progress;
-use super::stop::{Stop, command_line, interrupted};
+use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use super::train;
 use super::watched::evaluate_watched;
@@ -102,7 +102,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
     warn(&dataset.warnings);
     let terminal = Terminal {
         alone: args.jobs == 1,
-        stop: Stop::on_signal()?,
+        stop: Stop::on_signal(format!("stopped and saved; go on with\n  {}", command()))?,
     };
     let reproduction = Reproduction {
         rows: &rows,
@@ -127,11 +127,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
             writeln!(io::stdout(), "{}", args.out.display())?;
             Ok(ExitCode::SUCCESS)
         }
-        Ending::Stopped => {
-            let command = command_line();
-            notice(format_args!("stopped and saved; go on with\n  {command}"));
-            Ok(interrupted())
-        }
+        Ending::Stopped => Ok(interrupted(&terminal.stop.farewell)),
         Ending::Diverged(error) => Err(anyhow::Error::new(error).context("a training diverged")),
     }
 }
@@ -177,7 +173,11 @@ impl Observer for Terminal {
             false => format!("{}: ", row.folder),
         };
         let mut progress = Progress::new(name, task, before);
-        Ok(Box::new(move |report| progress.step(report)))
+        let training = self.stop.training();
+        Ok(Box::new(move |report| {
+            let _until_it_is_saved = &training;
+            progress.step(report);
+        }))
     }
 
     fn evaluate(

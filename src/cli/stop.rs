@@ -1,8 +1,9 @@
 //! Stopping a command that takes long, and going on with it.
 
+use std::fmt::Display;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 
@@ -10,47 +11,76 @@ use super::notice::notice;
 
 /// Exit code after Ctrl-C or SIGTERM, as shells have it.
 const INTERRUPTED: u8 = 130;
+/// How long an evaluation may take to end by itself.
+const LATE: Duration = Duration::from_secs(1);
 
 /// Whether the user asked to stop.
-#[derive(Clone)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop {
+    asked: Arc<OnceLock<Instant>>,
+    /// Held by every training, which is to be saved first.
+    trainings: Arc<()>,
+    /// What is said at the end.
+    pub farewell: String,
+}
 
 impl Stop {
-    /// Set by Ctrl-C or SIGTERM; the second time ends the process at once, which loses the steps
+    /// Asked by Ctrl-C or SIGTERM; the second time ends the process at once, which loses the steps
     /// since the last checkpoint only.
     ///
     /// # Errors
     /// The signals cannot be caught. A process does so once.
-    pub fn on_signal() -> anyhow::Result<Self> {
-        let stop = Self(Arc::new(AtomicBool::new(false)));
-        let flag = stop.clone();
+    pub fn on_signal(farewell: String) -> anyhow::Result<Self> {
+        let asked = Arc::new(OnceLock::new());
+        let flag = Arc::clone(&asked);
         ctrlc::set_handler(move || {
-            if flag.0.swap(true, Ordering::Relaxed) {
+            if flag.set(Instant::now()).is_err() {
                 std::process::exit(INTERRUPTED.into());
             }
             notice("stopping; once more to stop at once");
         })
         .context("no handler for Ctrl-C")?;
-        Ok(stop)
+        Ok(Self {
+            asked,
+            trainings: Arc::default(),
+            farewell,
+        })
     }
 
     pub fn is_asked(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.asked.get().is_some()
+    }
+
+    /// Says that a training goes on while the result lives.
+    pub fn training(&self) -> Arc<()> {
+        Arc::clone(&self.trainings)
+    }
+
+    /// Ends the process where what else goes on took too long to end by itself, and no training is
+    /// to be saved.
+    pub fn end_late(&self, before: impl FnOnce()) {
+        let late = self.asked.get().is_some_and(|it| it.elapsed() > LATE);
+        if late && Arc::strong_count(&self.trainings) == 1 {
+            before();
+            notice(&self.farewell);
+            std::process::exit(INTERRUPTED.into());
+        }
     }
 }
 
-/// The exit code of a command that was stopped.
-pub fn interrupted() -> ExitCode {
+/// Says how a command that was stopped goes on; its exit code.
+pub fn interrupted(farewell: impl Display) -> ExitCode {
+    notice(farewell);
     ExitCode::from(INTERRUPTED)
 }
 
-/// The command as it was given, for the shell.
-pub fn command_line() -> String {
+/// The command as it was given, for a shell.
+pub fn command() -> String {
     let words = std::env::args_os().skip(1);
     let words = words.map(|word| format!(" {}", quote(&word.to_string_lossy())));
     format!("keydance{}", words.collect::<String>())
 }
 
+/// A word for the shell.
 fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-/=:,+@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -11,7 +11,7 @@ use indicatif::HumanDuration;
 
 use super::notice::{notice, warn};
 use super::progress::Progress;
-use super::stop::{Stop, command_line, interrupted};
+use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use crate::counted::counted;
 use crate::data::Dataset;
@@ -71,7 +71,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         None => {}
     }
     let mut progress = Progress::new(String::new(), trainer.task(), trainer.frame_steps_done());
-    let stop = Stop::on_signal()?;
+    let stop = Stop::on_signal(String::new())?;
     let outcome = trainer.run(Some(&run), &mut |report| {
         progress.step(report);
         match stop.is_asked() {
@@ -88,12 +88,11 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         }
         Outcome::Stopped => {
             let (done, all) = (trainer.steps_done(), trainer.task().steps());
-            notice(format_args!(
-                "stopped and saved after step {done} of {all}; go on with\n  {}{}",
-                command_line(),
-                if args.resume { "" } else { " --resume" }
-            ));
-            Ok(interrupted())
+            let resume = if args.resume { "" } else { " --resume" };
+            Ok(interrupted(format_args!(
+                "stopped and saved after step {done} of {all}; go on with\n  {}{resume}",
+                command()
+            )))
         }
     }
 }

@@ -1,6 +1,8 @@
 //! An evaluation that shows how far it is, and stops with its command.
 
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use super::progress::Meter;
 use super::stop::Stop;
@@ -8,6 +10,9 @@ use crate::data::{DataPart, Dataset, Recording};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
 use crate::models::Generator;
 use crate::models::watched::Watched;
+
+/// Time between two looks at whether an evaluation that was stopped has ended.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Evaluates a model and shows on stderr how far it got: with a bar where it is `alone`. Ends early
 /// where `stop` is asked to.
@@ -25,8 +30,9 @@ pub fn evaluate_watched(
     let recordings = part.of(dataset)?.iter();
     let frames: Vec<usize> = recordings.map(Recording::frames).collect();
     let shown = Mutex::new((0, Meter::new(protocol.frames(&frames), 0, alone)));
+    let meter = || shown.lock().unwrap_or_else(PoisonError::into_inner);
     let answered = |frames: u64| {
-        let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut shown = meter();
         let (done, meter) = &mut *shown;
         *done += frames;
         let (_, left) = meter.speed(*done);
@@ -38,8 +44,18 @@ pub fn evaluate_watched(
         stopped: &|| stop.is_some_and(Stop::is_asked),
         answered: &answered,
     };
-    let evaluation = protocol.evaluate(&watched, dataset, part);
-    let shown = shown.into_inner();
-    shown.unwrap_or_else(PoisonError::into_inner).1.clear();
+    let evaluation = std::thread::scope(|scope| {
+        let (_evaluating, ended) = mpsc::channel::<()>();
+        if let Some(stop) = stop {
+            let meter = &meter;
+            scope.spawn(move || {
+                while ended.recv_timeout(LOOK_EVERY) == Err(RecvTimeoutError::Timeout) {
+                    stop.end_late(|| meter().1.clear());
+                }
+            });
+        }
+        protocol.evaluate(&watched, dataset, part)
+    });
+    meter().1.clear();
     evaluation
 }

@@ -469,6 +469,7 @@ fn ctrl_c_and_sigterm_end_an_evaluation_and_the_same_command_goes_on() {
     assert_eq!(code, Some(130), "{said}");
     assert!(took < Duration::from_secs(5), "{took:?}");
     assert!(said.contains("nothing is written"), "{said}");
+    assert!(said.contains(&format!("keydance evaluate {run}")), "{said}");
     assert!(!folder.join("scores.json").exists());
 
     let output = about_long_evaluation(&rows).output().unwrap();
@@ -477,6 +478,23 @@ fn ctrl_c_and_sigterm_end_an_evaluation_and_the_same_command_goes_on() {
     // Nothing was trained again.
     let again = fs::metadata(folder.join("runs/small/weights.safetensors")).unwrap();
     assert_eq!(again.modified().unwrap(), weights.modified().unwrap());
+}
+
+#[test]
+fn an_evaluation_does_not_wait_for_an_answer_that_takes_long() {
+    let folder = LONG_EVALUATION.path();
+    // The paper's sizes: an answer to 64 windows of 150 frames takes seconds on a thread.
+    let config = "name = 'large'\n[data]\nsplit = { share = 0.8 }\n[model]\nkind = 'pan2021'\n\
+        [schedule]\nmax_len = 6\nframe_steps = 50\nbatch_size = 8\nshards = 1\n";
+    fs::write(folder.join("large.toml"), config).unwrap();
+    let train = ["train", "large.toml", "--out", "large"];
+    let output = about_long_evaluation(&train).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let score = ["evaluate", "large", "--lengths", "150"];
+    let (took, code, said) = stopped_while_evaluating(about_long_evaluation(&score), "-INT");
+    assert_eq!(code, Some(130), "{said}");
+    assert!(took < Duration::from_secs(3), "{took:?}");
+    assert!(said.contains("nothing is written"), "{said}");
 }
 
 #[test]

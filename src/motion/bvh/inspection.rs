@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Axis, Bvh};
+use crate::counted::counted;
 use crate::motion::frame_rate::meant_rate;
 use crate::motion::{Measured, Unit, Up};
 
@@ -67,7 +68,8 @@ impl fmt::Display for Inspection<'_> {
             meant_rate(frame_time).map_or_else(String::new, |fps| format!(", taken as {fps:.3}"))
         )?;
         writeln!(f, "duration     {:.3} s", frames as f64 * frame_time)?;
-        writeln!(f, "joints       {} and {ends} End Sites", joints.len())?;
+        let ends = counted(ends, "End Site");
+        writeln!(f, "joints       {} and {ends}", joints.len())?;
         writeln!(f, "channels     {}", document.motion().ncols())?;
         writeln!(f, "unit         {}", self.unit(&measured))?;
         writeln!(f, "up           {up}")?;

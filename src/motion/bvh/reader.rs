@@ -7,6 +7,7 @@ use super::error::BvhError;
 use super::hierarchy::hierarchy;
 use super::rows::motion;
 use super::scanner::Scanner;
+use crate::counted::counted;
 
 /// Reads a BVH file. The document takes the file's name.
 ///
@@ -37,7 +38,11 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<Bvh, BvhError> {
         let expected = format!("at least one channel for every {JOINTS_PER_CHANNEL} joints");
         return Err(scanner.error(
             expected,
-            format!("{total} channels for {} joints", skeleton.len()),
+            format!(
+                "{} for {} joints",
+                counted(total, "channel"),
+                skeleton.len()
+            ),
         ));
     }
     let (frame_time, motion) = motion(&mut scanner, total)?;
