@@ -237,7 +237,7 @@ fn many_joints_without_channels_are_refused_before_they_fill_memory() {
     assert!(
         error(text.as_bytes())
             .1
-            .contains("at least one channel for every 16 joints, found 1 channels for 1001")
+            .contains("at least one channel for every 16 joints, found 1 channel for 1001")
     );
 }
 

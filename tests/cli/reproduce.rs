@@ -419,7 +419,7 @@ fn names_and_seeds_that_no_config_has_are_errors_that_list_those_there_are() {
     for (arguments, words) in [
         (["--only", "two_lstms"], "has no such config"),
         (["--seeds", "two_lstms=1,2"], "has no such config"),
-        (["--seeds", "whole_model=1,x"], "whole_model=1,2,3"),
+        (["--seeds", "whole_model=1,x"], "such as mine=1,2,3"),
         (["--seeds", "whole_model=1,1"], "twice"),
     ] {
         let refused = reproduce(place.path()).args(arguments).assert().failure();
