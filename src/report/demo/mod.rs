@@ -92,8 +92,7 @@ pub fn write_scores(
 ) -> Result<(), ReportError> {
     let choreography = &settings.choreography;
     let subject = format!(
-        "{} of {} of {} (seed {}), the paper's on its own data: not \
-         comparable",
+        "{} of {} of {} (seed {})",
         dataset.test.len(),
         counted(choreography.clips, "generated clip"),
         counted(choreography.frames_per_clip, "frame"),
