@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let said = head.forward(&mut tape, x)?;
         let loss = tape.mean_squared_error(said, fetched)?;
         if step % 200 == 0 {
-            println!("step {step}: {:.4}", tape.values(loss)?[0]);
+            println!("step {step}: {:.4}", tape.values(loss)[0]);
         }
         tape.backward(loss, &mut gradients)?;
         adam.step(&mut parameters, &mut gradients)?;

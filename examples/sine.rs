@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let predicted = mlp.forward(&mut tape, input)?;
         let loss = tape.mean_squared_error(predicted, target)?;
         if step % 200 == 0 {
-            println!("step {step}: {:.6}", tape.values(loss)?[0]);
+            println!("step {step}: {:.6}", tape.values(loss)[0]);
         }
         tape.backward(loss, &mut gradients)?;
         adam.step(&mut parameters, &mut gradients)?;

@@ -7,9 +7,9 @@
 //! let (_, weight) = parameters.add("weight", ndarray::arr1(&[3.0, -1.0]).into_dyn());
 //! let (mut gradients, mut workspace) = (Gradients::zeros(&parameters), Workspace::new());
 //! let mut tape = Tape::recording(&parameters, &mut workspace);
-//! let weight = tape.block(weight)?;
-//! let squares = tape.square(weight)?;
-//! let loss = tape.sum(squares)?;
+//! let weight = tape.block(weight);
+//! let squares = tape.square(weight);
+//! let loss = tape.sum(squares);
 //! tape.backward(loss, &mut gradients)?;
 //! assert_eq!(gradients.iter().next(), Some(&[6.0, -2.0][..]));
 //! # Ok::<(), keydance::autograd::AutogradError>(())

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use ndarray::{Array, ArrayD, ArrayViewD, Dimension, IxDyn};
+use ndarray::{Array, ArrayD, ArrayViewD, Dimension, IxDyn, aview1};
 
 use super::error::AutogradError;
 use super::kernels::Real;
@@ -24,6 +24,12 @@ pub struct Var {
 }
 
 impl Var {
+    /// What an operation gives that was refused: a value of no tape.
+    const NONE: Self = Self {
+        index: u32::MAX,
+        stamp: u32::MAX,
+    };
+
     fn index(self) -> usize {
         self.index as usize
     }
@@ -85,13 +91,17 @@ pub(super) struct Lists<T: Real> {
 /// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape
 /// ends or [`Tape::forget_since`].
 ///
+/// A method that returns no `Result` and is asked for what it cannot do gives a value of no tape:
+/// whatever is then asked of that, the way back included, fails with the reason, and there is
+/// nothing to read in it.
+///
 /// ```
 /// use keydance::autograd::{Gradients, Parameters, Tape, Workspace};
 ///
 /// let (parameters, mut workspace) = (Parameters::<f64>::new(), Workspace::new());
 /// let mut tape = Tape::recording(&parameters, &mut workspace);
 /// let x = tape.input(ndarray::arr1(&[1.0, 2.0]));
-/// let y = tape.square(x)?;
+/// let y = tape.square(x);
 /// let mut gradients = Gradients::zeros(&parameters);
 /// let of_x = tape.backward_from(y, &[1.0, 10.0], &[x], &mut gradients)?.remove(0);
 /// assert_eq!(of_x, ndarray::arr1(&[2.0, 40.0]).into_dyn());
@@ -108,6 +118,8 @@ pub struct Tape<'a, T: Real> {
     frozen: bool,
     dropout_key: Option<u64>,
     trace: bool,
+    /// Why [`Var::NONE`] was given first.
+    refused: Option<AutogradError>,
 }
 
 impl<'a, T: Real> Tape<'a, T> {
@@ -127,6 +139,7 @@ impl<'a, T: Real> Tape<'a, T> {
             frozen: false,
             dropout_key: None,
             trace: false,
+            refused: None,
         }
     }
 
@@ -193,27 +206,23 @@ impl<'a, T: Real> Tape<'a, T> {
     }
 
     /// A constant of the given shape in a reused buffer that `fill` writes, all of it.
-    ///
-    /// # Errors
-    /// A shape of more numbers than memory has addresses.
-    pub fn constant_with(
-        &mut self,
-        shape: &[usize],
-        fill: impl FnOnce(&mut [T]),
-    ) -> Result<Var, AutogradError> {
-        let mut buffer = self.take_for("constant", shape)?;
-        fill(&mut buffer);
-        Ok(self.push("constant", &[], shape, buffer, false, None))
+    pub fn constant_with(&mut self, shape: &[usize], fill: impl FnOnce(&mut [T])) -> Var {
+        match self.take_for("constant", shape) {
+            Ok(mut buffer) => {
+                fill(&mut buffer);
+                self.push("constant", &[], shape, buffer, false, None)
+            }
+            Err(error) => self.refuse(error),
+        }
     }
 
     /// The numbers of `x` as a constant: no gradient goes back through it.
-    ///
-    /// # Errors
-    /// A value of another tape.
-    pub fn detach(&mut self, x: Var) -> Result<Var, AutogradError> {
-        self.own("detach", &[x])?;
+    pub fn detach(&mut self, x: Var) -> Var {
+        if let Err(error) = self.own("detach", &[x]) {
+            return self.refuse(error);
+        }
         let (shape, buffer) = self.copy(x);
-        Ok(self.push("detach", &[x], &shape, buffer, false, None))
+        self.push("detach", &[x], &shape, buffer, false, None)
     }
 
     /// A value that is given and wants a gradient of its own, see [`Tape::backward_from`].
@@ -241,58 +250,66 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// A block of a parameter, the same value however often it is asked for; inside
     /// [`Tape::frozen`] a constant.
-    ///
-    /// # Errors
-    /// A block of other parameters than the tape's.
-    pub fn block(&mut self, id: BlockId) -> Result<Var, AutogradError> {
-        self.parameters.check_block(id)?;
+    pub fn block(&mut self, id: BlockId) -> Var {
+        if let Err(error) = self.parameters.check_block(id) {
+            return self.refuse(error);
+        }
         if let Some(var) = self.leaves[id.index].filter(|_| !self.frozen) {
-            return Ok(var);
+            return var;
         }
         let needs_gradient = !self.frozen;
         let var = self.node("parameter", Value::Block(id), &[], needs_gradient, None);
         if !self.frozen {
             self.leaves[id.index] = Some(var);
         }
-        Ok(var)
+        var
     }
 
-    /// # Errors
-    /// A value of another tape.
-    pub fn shape(&self, var: Var) -> Result<&[usize], AutogradError> {
-        self.own("shape", &[var])?;
-        Ok(self.known().shape(var))
+    /// `[0]` for a value of another tape.
+    pub fn shape(&self, var: Var) -> &[usize] {
+        match self.has(var) {
+            true => self.known().shape(var),
+            false => &[0],
+        }
     }
 
-    /// The numbers of a value in row-major order.
-    ///
-    /// # Errors
-    /// A value of another tape.
-    pub fn values(&self, var: Var) -> Result<&[T], AutogradError> {
-        self.own("values", &[var])?;
-        Ok(self.known().values(var))
+    /// The numbers of a value in row-major order; none for one of another tape.
+    pub fn values(&self, var: Var) -> &[T] {
+        match self.has(var) {
+            true => self.known().values(var),
+            false => &[],
+        }
     }
 
-    /// A value as an array.
-    ///
-    /// # Errors
-    /// A value of another tape.
-    pub fn array(&self, var: Var) -> Result<ArrayViewD<'_, T>, AutogradError> {
-        self.own("array", &[var])?;
-        Ok(self.known().array(var))
+    /// A value as an array, `[0]` for one of another tape.
+    pub fn array(&self, var: Var) -> ArrayViewD<'_, T> {
+        match self.has(var) {
+            true => self.known().array(var),
+            false => aview1(&[]).into_dyn(),
+        }
+    }
+
+    fn has(&self, var: Var) -> bool {
+        let node = self.nodes.get(var.index());
+        node.is_some_and(|node| node.stamp == var.stamp)
     }
 
     /// Refuses operands that are not on this tape: each operation begins with it.
     pub(super) fn own(&self, operation: &'static str, vars: &[Var]) -> Result<(), AutogradError> {
-        let here = |var: &Var| {
-            let node = self.nodes.get(var.index());
-            node.is_some_and(|node| node.stamp == var.stamp)
-        };
-        if vars.iter().all(here) {
-            return Ok(());
+        match vars.iter().find(|&&var| !self.has(var)) {
+            None => Ok(()),
+            Some(&var) => {
+                let what = "a value is not on this tape: it was made on another, or is forgotten";
+                let refused = self.refused.clone().filter(|_| var == Var::NONE);
+                Err(refused.unwrap_or(AutogradError::Misplaced { operation, what }))
+            }
         }
-        let what = "a value is not on this tape: it was made on another one, or is forgotten";
-        Err(AutogradError::Misplaced { operation, what })
+    }
+
+    /// Keeps why an operation gives no value.
+    pub(super) fn refuse(&mut self, error: AutogradError) -> Var {
+        self.refused.get_or_insert(error);
+        Var::NONE
     }
 
     /// Rows and columns of a value seen as a matrix: the last axis, and all before it.
@@ -430,19 +447,14 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// Without recording: drops every value made since `mark` but those in `keep`, which are
     /// renamed in place. So a long generation needs the memory of one frame.
-    ///
-    /// # Errors
-    /// A value to keep that is of another tape; then none is dropped.
-    pub fn forget_since(
-        &mut self,
-        mark: usize,
-        keep: &mut [&mut Var],
-    ) -> Result<(), AutogradError> {
-        for var in keep.iter() {
-            self.own("forget_since", &[**var])?;
+    pub fn forget_since(&mut self, mark: usize, keep: &mut [&mut Var]) {
+        for var in keep.iter_mut() {
+            if let Err(error) = self.own("forget_since", &[**var]) {
+                **var = self.refuse(error);
+            }
         }
         if self.recording {
-            return Ok(());
+            return;
         }
         self.stamp = new_stamp();
         let mut renamed: Vec<(Var, Var)> = Vec::new();
@@ -480,11 +492,14 @@ impl<'a, T: Real> Tape<'a, T> {
                 **var = *new;
             }
         }
-        Ok(())
     }
 
-    /// The first value on the tape that is not finite, as an error that names its operation.
+    /// The first value on the tape that is not finite, as an error that names its operation; before
+    /// that, an operation that was refused.
     pub fn check_finite(&self) -> Result<(), AutogradError> {
+        if let Some(refused) = &self.refused {
+            return Err(refused.clone());
+        }
         for (index, node) in self.nodes.iter().enumerate() {
             if let Value::Array(array) = &node.value
                 && let Some(what) = array.as_slice().and_then(not_finite)

@@ -108,9 +108,9 @@ impl LossTerms {
         terms: &[(&'static str, f64, Var)],
         critics: Option<Var>,
     ) -> Result<Self, AutogradError> {
-        let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()))?;
+        let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
         for &(_, weight, term) in terms {
-            let weighted = tape.affine(term, weight, 0.0)?;
+            let weighted = tape.affine(term, weight, 0.0);
             total = tape.add(total, weighted)?;
         }
         Ok(Self {

@@ -144,7 +144,7 @@ impl MultiHeadAttention {
         let TransformerSizes {
             width: d, heads, ..
         } = self.sizes;
-        let shape = tape.shape(basis)?;
+        let shape = tape.shape(basis);
         let k = shape.first().copied().unwrap_or(0);
         if ones.start > ones.end || ones.end > k {
             return Err(AutogradError::Argument {
@@ -154,17 +154,17 @@ impl MultiHeadAttention {
                 expected: "a range of its rows",
             });
         }
-        let weight = tape.block(self.in_projection.weight)?;
+        let weight = tape.block(self.in_projection.weight);
         let projected = tape.linear(basis, weight, None, false)?;
         let mask = tape.constant_with(&[k, 1], |out| {
             out.fill(T::zero());
             out[ones].fill(T::one());
-        })?;
-        let bias = tape.block(self.in_projection.bias)?;
+        });
+        let bias = tape.block(self.in_projection.bias);
         let bias = tape.reshape(bias, &[1, 3 * d])?;
         let bias = tape.mul(bias, mask)?;
         let projected = tape.add(projected, bias)?;
-        let output = tape.block(self.output.weight)?;
+        let output = tape.block(self.output.weight);
         let (mut forms, mut outputs) = (Vec::new(), Vec::new());
         for h in 0..heads {
             let columns = |part: usize| {
@@ -204,7 +204,7 @@ impl MultiHeadAttention {
         let scale = 1.0 / ((width / heads) as f64).sqrt();
         let queries = tape.linear(numbers, narrow.forms, None, false)?;
         let y = tape.shared_attention(queries, numbers, tokens, scale, dropout)?;
-        let bias = tape.block(self.output.bias)?;
+        let bias = tape.block(self.output.bias);
         tape.linear(y, narrow.outputs, Some(bias), false)
     }
 
@@ -257,13 +257,11 @@ impl MultiHeadAttention {
         count: usize,
     ) -> Result<Var, AutogradError> {
         let q = self.queries.forward(tape, x)?;
-        let mut blocks = |ids: &[BlockId]| -> Result<Vec<Var>, AutogradError> {
-            ids.iter().map(|&id| tape.block(id)).collect()
-        };
+        let mut blocks = |ids: &[BlockId]| ids.iter().map(|&id| tape.block(id)).collect();
         let weights = QueryAttentionWeights {
-            keys: blocks(&self.head_keys)?,
-            values: blocks(&self.head_values)?,
-            value_bias: tape.block(self.value_bias)?,
+            keys: blocks(&self.head_keys),
+            values: blocks(&self.head_values),
+            value_bias: tape.block(self.value_bias),
         };
         let y = tape.query_attention(q, tokens, weights, count, self.sizes.dropout)?;
         self.output.forward(tape, y)

@@ -49,7 +49,7 @@ impl Linear {
     /// # Errors
     /// An input of another width.
     pub fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
-        let (weight, bias) = (tape.block(self.weight)?, tape.block(self.bias)?);
+        let (weight, bias) = (tape.block(self.weight), tape.block(self.bias));
         tape.linear(x, weight, Some(bias), false)
     }
 
@@ -62,7 +62,7 @@ impl Linear {
         tape: &mut Tape<'_, T>,
         x: Var,
     ) -> Result<Var, AutogradError> {
-        let (weight, bias) = (tape.block(self.weight)?, tape.block(self.bias)?);
+        let (weight, bias) = (tape.block(self.weight), tape.block(self.bias));
         tape.linear(x, weight, Some(bias), true)
     }
 }

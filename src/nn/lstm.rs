@@ -38,14 +38,7 @@ impl Lstm {
     }
 
     /// The state before the first step, zeros `[batch, 2H]`.
-    ///
-    /// # Errors
-    /// A batch that is larger than memory.
-    pub fn start<T: Real>(
-        &self,
-        tape: &mut Tape<'_, T>,
-        batch: usize,
-    ) -> Result<Var, AutogradError> {
+    pub fn start<T: Real>(&self, tape: &mut Tape<'_, T>, batch: usize) -> Var {
         tape.constant_with(&[batch, 2 * self.hidden], |state| state.fill(T::zero()))
     }
 
@@ -61,10 +54,10 @@ impl Lstm {
         state: Var,
     ) -> Result<(Var, Var), AutogradError> {
         let weights = LstmWeights {
-            weight_ih: tape.block(self.weight_ih)?,
-            weight_hh: tape.block(self.weight_hh)?,
-            bias_ih: tape.block(self.bias_ih)?,
-            bias_hh: tape.block(self.bias_hh)?,
+            weight_ih: tape.block(self.weight_ih),
+            weight_hh: tape.block(self.weight_hh),
+            bias_ih: tape.block(self.bias_ih),
+            bias_hh: tape.block(self.bias_hh),
         };
         let state = tape.lstm_cell(x, state, weights)?;
         let output = tape.columns(state, 0..self.hidden)?;

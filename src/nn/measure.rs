@@ -144,8 +144,8 @@ impl MeasuredLayers {
                 let tape = Tape::recording(parameters, &mut shard.workspace);
                 let mut tape = tape.with_dropout(1);
                 let y = layers.forward(&mut tape, &shard.input)?;
-                let squares = tape.square(y)?;
-                let loss = tape.sum(squares)?;
+                let squares = tape.square(y);
+                let loss = tape.sum(squares);
                 tape.backward(loss, &mut shard.gradients)
             })
         })?;
@@ -166,7 +166,7 @@ impl Layers {
             Self::Lstm { lstm, head } => {
                 let x = tape.constant(input.clone());
                 let count = input.shape()[0] / FRAMES;
-                let mut state = lstm.start(tape, count)?;
+                let mut state = lstm.start(tape, count);
                 let mut outputs = Vec::new();
                 for t in 0..FRAMES {
                     let x = tape.rows(x, t * count..(t + 1) * count)?;

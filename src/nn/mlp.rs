@@ -109,10 +109,10 @@ impl Mlp {
             };
             match *step {
                 Step::Prelu(slope) => {
-                    let slope = tape.block(slope)?;
+                    let slope = tape.block(slope);
                     x = tape.prelu(x, slope)?;
                 }
-                Step::Plu => x = tape.plu(x)?,
+                Step::Plu => x = tape.plu(x),
                 Step::Identity | Step::Relu => {}
             }
         }

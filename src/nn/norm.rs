@@ -36,7 +36,7 @@ impl LayerNorm {
         residual: Var,
         dropout: f64,
     ) -> Result<Var, AutogradError> {
-        let weights = (tape.block(self.weight)?, tape.block(self.bias)?);
+        let weights = (tape.block(self.weight), tape.block(self.bias));
         tape.add_layer_norm(x, residual, weights, dropout)
     }
 }

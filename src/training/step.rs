@@ -209,15 +209,11 @@ fn run_shard(
         tape = tape.with_trace();
     }
     let losses = input.step.losses(&mut tape, shard)?;
-    let number = |var| -> Result<f64, AutogradError> {
-        Ok(tape.values(var)?.iter().map(|&x| f64::from(x)).sum())
-    };
+    let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
     let terms = losses.terms.iter();
     let values = Losses {
-        total: number(losses.total)?,
-        terms: terms
-            .map(|&(name, var)| Ok((name, number(var)?)))
-            .collect::<Result<_, AutogradError>>()?,
+        total: number(losses.total),
+        terms: terms.map(|&(name, var)| (name, number(var))).collect(),
         buffers: losses.buffers,
     };
     if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {

@@ -134,7 +134,7 @@ fn check(transition: usize, forcing: Forcing) {
         };
         assert_close(
             &format!("{case}: {name}"),
-            tape.values(var).unwrap().iter(),
+            tape.values(var).iter(),
             &[recorded],
         );
     }

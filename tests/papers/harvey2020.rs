@@ -149,7 +149,7 @@ fn losses(built: &Built<f64>, batches: &[Batch<f64>], dropout: Option<u64>) -> L
             .losses(&mut tape, batch, Forcing::FreeRunning)
             .unwrap();
         for (name, var) in losses.terms.into_iter().chain([("total", losses.total)]) {
-            *values.entry(name).or_insert(0.0) += tape.values(var).unwrap()[0];
+            *values.entry(name).or_insert(0.0) += tape.values(var)[0];
         }
         tape.backward(losses.total, &mut gradients).unwrap();
     }
@@ -480,7 +480,7 @@ fn forward_kinematics_on_the_tape_are_those_of_the_clips() {
     let joints = tape
         .forward_kinematics(rotations, offsets, &DANCE_PARENTS)
         .unwrap();
-    let joints = Array2::from_shape_vec((rows, 72), tape.values(joints).unwrap().to_vec()).unwrap();
+    let joints = Array2::from_shape_vec((rows, 72), tape.values(joints).to_vec()).unwrap();
     for row in 0..rows {
         let frame = batch.features.slice(s![row / 4, row % 4..=row % 4, ..]);
         let world = world_positions(standardisation.restore(frame).row(0));
@@ -517,7 +517,7 @@ fn the_network_learns_one_window_by_heart() {
             .losses(&mut tape, &batch, Forcing::FreeRunning)
             .unwrap();
         let term = losses.terms.iter().find(|(name, _)| *name == "position");
-        position.push(tape.values(term.unwrap().1).unwrap()[0]);
+        position.push(tape.values(term.unwrap().1)[0]);
         tape.backward(losses.total, &mut gradients).unwrap();
         adam.step(&mut built.parameters, &mut gradients).unwrap();
     }

@@ -302,7 +302,7 @@ fn losses(config: &Pan2021Config, forcing: Forcing) -> BTreeMap<&'static str, f6
     let losses = built.network.losses(&mut tape, &batch, forcing).unwrap();
     let values = losses.terms.into_iter().chain([("total", losses.total)]);
     values
-        .map(|(name, var)| (name, tape.values(var).unwrap()[0]))
+        .map(|(name, var)| (name, tape.values(var)[0]))
         .collect()
 }
 
@@ -515,7 +515,7 @@ fn predictions_are_the_frames_whose_losses_training_takes() {
                 .find(|(term, _)| *term == name)
                 .unwrap()
                 .1;
-            let term = tape.values(term).unwrap()[0];
+            let term = tape.values(term)[0];
             assert!((ours - term).abs() < 1e-12 * term, "{name}: {ours} {term}");
         }
     }
@@ -532,7 +532,7 @@ fn gradients_of(built: &Built<f64>, batches: &[Batch<f64>], forcing: Forcing) ->
             .losses(&mut tape, batch, forcing)
             .unwrap()
             .total;
-        sum += tape.values(total).unwrap()[0];
+        sum += tape.values(total)[0];
         tape.backward(total, &mut gradients).unwrap();
     }
     (sum, gradients.iter().flatten().copied().collect())

@@ -372,7 +372,7 @@ fn the_loss_of_single_frames_is_the_distance_from_the_true_p_b_that_the_control_
         .iter()
         .find(|(name, _)| *name == "single_frames")
         .unwrap();
-    let found = tape.values(*term).unwrap()[0];
+    let found = tape.values(*term)[0];
     assert!(
         (found - expected / 5.0).abs() < 1e-9 * found,
         "{found} {expected}"
@@ -422,7 +422,7 @@ fn an_ensemble_of_control_paths_adds_the_mean_of_its_members_and_trains_each_by_
             .losses(&mut tape, &batch, Forcing::FreeRunning);
         let terms = losses.unwrap().terms;
         let term = terms.iter().find(|(name, _)| *name == "single_frames");
-        tape.values(term.unwrap().1).unwrap()[0]
+        tape.values(term.unwrap().1)[0]
     };
     let weights: BTreeMap<String, ArrayD<f64>> = together
         .parameters

@@ -55,18 +55,18 @@ impl<T: Real> Network<T> for Recurrence {
             self.output[0],
             self.output[1],
         ]
-        .map(|block| tape.block(block).unwrap());
+        .map(|block| tape.block(block));
         let mut current = tape.constant(frame(0));
         let mut sum = None;
         for t in 1..frames {
             let hidden = tape.linear(current, w1, Some(b1), false)?;
-            let hidden = tape.tanh(hidden).unwrap();
-            let hidden = tape.dropout(hidden, 0.1).unwrap();
+            let hidden = tape.tanh(hidden);
+            let hidden = tape.dropout(hidden, 0.1);
             let next = tape.linear(hidden, w2, Some(b2), false)?;
             let truth = tape.constant(frame(t));
             let difference = tape.sub(next, truth)?;
-            let square = tape.square(difference).unwrap();
-            let loss = tape.sum(square).unwrap();
+            let square = tape.square(difference);
+            let loss = tape.sum(square);
             sum = Some(match sum {
                 None => loss,
                 Some(sum) => tape.add(sum, loss)?,
@@ -78,10 +78,10 @@ impl<T: Real> Network<T> for Recurrence {
         }
         let sum = match sum {
             Some(sum) => sum,
-            None => tape.sum(current).unwrap(),
+            None => tape.sum(current),
         };
         let count = (frames - 1) * batch.total_windows;
-        let total = tape.affine(sum, 1.0 / count as f64, 0.0).unwrap();
+        let total = tape.affine(sum, 1.0 / count as f64, 0.0);
         Ok(LossTerms {
             total,
             critics: None,

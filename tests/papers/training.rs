@@ -416,10 +416,10 @@ impl Network<f32> for Cusp {
         _batch: &Batch<f32>,
         _forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
-        let weight = tape.block(self.0).unwrap();
-        let square = tape.square(weight).unwrap();
-        let size = tape.sqrt(square).unwrap();
-        let total = tape.sum(size).unwrap();
+        let weight = tape.block(self.0);
+        let square = tape.square(weight);
+        let size = tape.sqrt(square);
+        let total = tape.sum(size);
         Ok(LossTerms {
             total,
             terms: vec![("size", total)],

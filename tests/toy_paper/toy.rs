@@ -214,22 +214,21 @@ impl Step<f32> for ToyStep<'_> {
                 out.iter_mut().zip(values).for_each(|(out, x)| *out = x);
             })
         };
-        let now = numbers(&|t| heights[t + 1] - mean)?;
-        let past = numbers(&|t| heights[t] - mean)?;
-        let clicks = numbers(&|t| click(start + t + 1))?;
-        let (a, b) = (tape.block(weights.a)?, tape.block(weights.b)?);
-        let s = tape.block(weights.s)?;
+        let now = numbers(&|t| heights[t + 1] - mean);
+        let past = numbers(&|t| heights[t] - mean);
+        let clicks = numbers(&|t| click(start + t + 1));
+        let [a, b, s] = [weights.a, weights.b, weights.s].map(|block| tape.block(block));
         let (followed, moved) = (tape.mul(past, a)?, tape.mul(clicks, b)?);
         let left = tape.sub(now, followed)?;
         let left = tape.sub(left, moved)?;
-        let inverse = tape.affine(s, -1.0, 0.0)?;
-        let inverse = tape.exp(inverse)?;
+        let inverse = tape.affine(s, -1.0, 0.0);
+        let inverse = tape.exp(inverse);
         let left = tape.mul(left, inverse)?;
-        let squares = tape.square(left)?;
-        let squares = tape.sum(squares)?;
+        let squares = tape.square(left);
+        let squares = tape.sum(squares);
         let share = 1.0 / (WINDOW * self.windows.len()) as f64;
-        let squares = tape.affine(squares, share / 2.0, 0.0)?;
-        let width = tape.affine(s, 1.0 / self.windows.len() as f64, 0.0)?;
+        let squares = tape.affine(squares, share / 2.0, 0.0);
+        let width = tape.affine(s, 1.0 / self.windows.len() as f64, 0.0);
         let mut terms = LossTerms::weighted(
             tape,
             &[("squares", 1.0, squares), ("width", 1.0, width)],

@@ -35,8 +35,9 @@ fn difference(
     b: Var,
     mistake: bool,
 ) -> Result<Var, AutogradError> {
-    let shape = tape.shape(a)?.to_vec();
-    let pairs = tape.values(a)?.iter().zip(tape.values(b)?);
+    tape.own("difference", &[a, b])?;
+    let shape = tape.shape(a).to_vec();
+    let pairs = tape.values(a).iter().zip(tape.values(b));
     let y = pairs.map(|(a, b)| a - b).collect();
     Ok(tape.put("difference", &[a, b], &shape, y, || Difference {
         a,
@@ -67,10 +68,11 @@ impl Operation<f64> for Shift {
 }
 
 fn shift(tape: &mut Tape<'_, f64>, x: Var, b: Var, mistake: bool) -> Result<Var, AutogradError> {
-    let shape = tape.shape(x)?.to_vec();
-    let bias = tape.values(b)?.iter().cycle();
+    tape.own("shift", &[x, b])?;
+    let shape = tape.shape(x).to_vec();
+    let bias = tape.values(b).iter().cycle();
     let y = tape
-        .values(x)?
+        .values(x)
         .iter()
         .zip(bias)
         .map(|(x, b)| x + b)
@@ -103,11 +105,12 @@ impl Operation<f64> for Product {
 }
 
 fn matrices(tape: &mut Tape<'_, f64>, a: Var, b: Var, mistake: bool) -> Result<Var, AutogradError> {
-    let n = tape.shape(a)?[0];
+    tape.own("product", &[a, b])?;
+    let n = tape.shape(a)[0];
     let mut y = vec![0.0; n * n];
     let (left, right) = (
-        Mat::new(tape.values(a)?, n, n),
-        Mat::new(tape.values(b)?, n, n),
+        Mat::new(tape.values(a), n, n),
+        Mat::new(tape.values(b), n, n),
     );
     product(left, right, MatMut::new(&mut y, n, n), false);
     Ok(tape.put("product", &[a, b], &[n, n], y, || Product {
@@ -130,11 +133,11 @@ fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport
         });
         parameters.add(format!("operand {k}"), value).1
     });
-    let loss = |tape: &mut Tape<'_, f64>| {
-        let (a, b) = (tape.block(blocks[0])?, tape.block(blocks[1])?);
+    let loss = |tape: &mut Tape<'_, f64>| -> Result<Var, AutogradError> {
+        let (a, b) = (tape.block(blocks[0]), tape.block(blocks[1]));
         let y = build(tape, a, b, mistake)?;
-        let squares = tape.square(y)?;
-        tape.sum(squares)
+        let squares = tape.square(y);
+        Ok(tape.sum(squares))
     };
     let mut workspace = Workspace::new();
     let mut gradients = Gradients::zeros(&parameters);
@@ -144,7 +147,7 @@ fn whole_loss(shapes: [&[usize]; 2], build: Build, mistake: bool) -> CheckReport
     check_parameters(&mut parameters, &gradients, 100, |parameters, _| {
         let mut tape = Tape::inference(parameters, &mut workspace);
         let total = loss(&mut tape)?;
-        Ok(tape.values(total)?[0])
+        Ok(tape.values(total)[0])
     })
     .unwrap()
 }

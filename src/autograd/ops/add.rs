@@ -35,9 +35,9 @@ pub(super) fn signed_sum<T: Real>(
     sign: T,
 ) -> Result<Var, AutogradError> {
     tape.own(name, &[a, b])?;
-    let shape = broadcast_shape(name, tape.known().shape(a), tape.known().shape(b))?;
+    let shape = broadcast_shape(name, tape.shape(a), tape.shape(b))?;
     let mut y = tape.take_for(name, &shape)?;
-    let (left, right) = (tape.known().array(a), tape.known().array(b));
+    let (left, right) = (tape.array(a), tape.array(b));
     zip_into(&mut y, &shape, left, right, |x, y| x + sign * y);
     Ok(tape.put(name, &[a, b], &shape, y, || Sum {
         a,

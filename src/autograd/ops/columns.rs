@@ -45,7 +45,7 @@ pub(super) fn columns_of<T: Real>(
     let (start, width) = (range.start, range.len());
     let mut y = tape.take(shape.iter().product());
     if !y.is_empty() {
-        let rows = tape.known().values(x).chunks_exact(total);
+        let rows = tape.values(x).chunks_exact(total);
         for (y, x) in y.chunks_exact_mut(width).zip(rows) {
             y.copy_from_slice(&x[range.clone()]);
         }
@@ -65,7 +65,7 @@ impl<T: Real> Tape<'_, T> {
     /// A range beyond the last axis.
     pub fn columns(&mut self, x: Var, range: Range<usize>) -> Result<Var, AutogradError> {
         self.own("columns", &[x])?;
-        let mut shape = self.known().shape(x).to_vec();
+        let mut shape = self.shape(x).to_vec();
         match shape.last_mut() {
             Some(last) if range.start <= range.end && range.end <= *last => {
                 let total = std::mem::replace(last, range.len());

@@ -44,10 +44,10 @@ impl<T: Real> Tape<'_, T> {
             let expected = "at least one part";
             return Err(argument_error("concat", &[], "no parts".into(), expected));
         };
-        let mut shape = self.known().shape(first).to_vec();
+        let mut shape = self.shape(first).to_vec();
         let lead = shape.len().saturating_sub(1);
         for &part in parts {
-            let other = self.known().shape(part);
+            let other = self.shape(part);
             if other.is_empty() || other.len() != shape.len() || other[..lead] != shape[..lead] {
                 let expected = "equal axes before the last";
                 return Err(shapes_error("concat", &shape, other, expected));
@@ -63,7 +63,7 @@ impl<T: Real> Tape<'_, T> {
         let mut start = 0;
         for &(part, width) in &widths {
             if width > 0 {
-                let x = self.known().values(part).chunks_exact(width);
+                let x = self.values(part).chunks_exact(width);
                 for (y, x) in y.chunks_exact_mut(total).zip(x) {
                     y[start..start + width].copy_from_slice(x);
                 }

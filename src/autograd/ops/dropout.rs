@@ -6,7 +6,7 @@
 //! ```
 
 use crate::autograd::kernels::dropout_into;
-use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
+use crate::autograd::{Backward, Operation, Real, Tape, Var};
 
 struct Dropout {
     x: Var,
@@ -31,18 +31,17 @@ impl<T: Real> Operation<T> for Dropout {
 impl<T: Real> Tape<'_, T> {
     /// `x` with each number set to 0 with probability `p` and the others scaled up; `x` itself
     /// where dropout is off.
-    ///
-    /// # Errors
-    /// A probability that is none; a value of another tape.
-    pub fn dropout(&mut self, x: Var, p: f64) -> Result<Var, AutogradError> {
-        self.own("dropout", &[x])?;
-        let Some((key, p)) = self.next_draws("dropout", p)? else {
-            return Ok(x);
+    pub fn dropout(&mut self, x: Var, p: f64) -> Var {
+        let draws = self.own("dropout", &[x]);
+        let (key, p) = match draws.and_then(|()| self.next_draws("dropout", p)) {
+            Ok(Some(draws)) => draws,
+            Ok(None) => return x,
+            Err(error) => return self.refuse(error),
         };
-        let shape = self.known().shape(x).to_vec();
-        let mut y = self.take(self.known().values(x).len());
-        dropout_into(key, p, self.known().values(x), &mut y);
-        Ok(self.put("dropout", &[x], &shape, y, || Dropout { x, p, key }))
+        let shape = self.shape(x).to_vec();
+        let mut y = self.take(self.values(x).len());
+        dropout_into(key, p, self.values(x), &mut y);
+        self.put("dropout", &[x], &shape, y, || Dropout { x, p, key })
     }
 }
 
@@ -54,7 +53,7 @@ pub(super) mod gradient {
         drawn((shapes(), 0.0..0.9), |(x, p), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
                 tape.set_dropout(Some(seed));
-                tape.dropout(v[0], p)
+                Ok(tape.dropout(v[0], p))
             })
         })
     }

@@ -96,14 +96,11 @@ impl<T: Real> Tape<'_, T> {
         let joints = parents.len();
         let before = |(joint, parent): (usize, &Option<usize>)| parent.is_none_or(|p| p < joint);
         if joints == 0 || !parents.iter().enumerate().all(before) {
-            let (shape, argument) = (
-                self.known().shape(rotations),
-                format!("parents {parents:?}"),
-            );
+            let (shape, argument) = (self.shape(rotations), format!("parents {parents:?}"));
             let expected = "at least one joint, each after its parent";
             return Err(argument_error(NAME, shape, argument, expected));
         }
-        let (left, right) = (self.known().shape(rotations), self.known().shape(offsets));
+        let (left, right) = (self.shape(rotations), self.shape(offsets));
         let (rows, bodies) = match (left, right) {
             (&[rows, four], &[bodies, three])
                 if four == 4 * joints
@@ -119,7 +116,7 @@ impl<T: Real> Tape<'_, T> {
         };
         let mut positions = self.take(rows * 3 * joints);
         let mut world = self.take(rows * 4 * joints);
-        let (local, all_offsets) = (self.known().values(rotations), self.known().values(offsets));
+        let (local, all_offsets) = (self.values(rotations), self.values(offsets));
         for row in 0..rows {
             let local = &local[row * 4 * joints..];
             let offsets = &all_offsets[(row % bodies) * 3 * joints..];
@@ -239,7 +236,7 @@ pub(super) mod gradient {
             case(&shapes, seed, 0.0, move |tape, v| {
                 let positions = tape.forward_kinematics(v[0], v[1], &parents)?;
                 // Deep trees of long quaternions grow large.
-                tape.affine(positions, 0.01, 0.0)
+                Ok(tape.affine(positions, 0.01, 0.0))
             })
         })
     }

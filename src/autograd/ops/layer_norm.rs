@@ -112,35 +112,25 @@ pub(super) fn layer_norm<T: Real>(
     let mut inputs = vec![x, gamma, beta];
     inputs.extend(residual);
     tape.own(name, &inputs)?;
-    let shape = tape.known().shape(x).to_vec();
+    let shape = tape.shape(x).to_vec();
     let (rows, columns) = tape.rows_and_columns(x);
     for weight in [gamma, beta] {
-        if shape.is_empty() || tape.known().shape(weight) != [columns] {
+        if shape.is_empty() || tape.shape(weight) != [columns] {
             let expected = "x [.., n] and gamma, beta [n]";
-            return Err(shapes_error(
-                name,
-                &shape,
-                tape.known().shape(weight),
-                expected,
-            ));
+            return Err(shapes_error(name, &shape, tape.shape(weight), expected));
         }
     }
     if let Some(residual) = residual
-        && tape.known().shape(residual) != shape
+        && tape.shape(residual) != shape
     {
         let expected = "x and residual of one shape";
-        return Err(shapes_error(
-            name,
-            &shape,
-            tape.known().shape(residual),
-            expected,
-        ));
+        return Err(shapes_error(name, &shape, tape.shape(residual), expected));
     }
     let mut y = tape.take(rows * columns);
     let mut statistics = tape.take(rows * 2);
-    let values = residual.map(|residual| tape.known().values(residual));
-    sum_into(&mut y, tape.known().values(x), values, dropout);
-    let (g, b) = (tape.known().values(gamma), tape.known().values(beta));
+    let values = residual.map(|residual| tape.values(residual));
+    sum_into(&mut y, tape.values(x), values, dropout);
+    let (g, b) = (tape.values(gamma), tape.values(beta));
     let scale = T::one() / T::from_f64(columns as f64);
     if columns > 0 {
         vectorised(

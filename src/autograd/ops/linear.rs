@@ -92,7 +92,7 @@ impl<T: Real> Tape<'_, T> {
         all.extend(bias);
         self.own("linear", &all)?;
         let (rows, inputs) = self.rows_and_columns(x);
-        let (left, right) = (self.known().shape(x), self.known().shape(weight));
+        let (left, right) = (self.shape(x), self.shape(weight));
         let outputs = match *right {
             [outputs, columns] if columns == inputs && !left.is_empty() => outputs,
             _ => {
@@ -101,9 +101,9 @@ impl<T: Real> Tape<'_, T> {
             }
         };
         if let Some(bias) = bias
-            && self.known().shape(bias) != [outputs]
+            && self.shape(bias) != [outputs]
         {
-            let (left, right) = (self.known().shape(weight), self.known().shape(bias));
+            let (left, right) = (self.shape(weight), self.shape(bias));
             let expected = "weight [out, in] and bias [out]";
             return Err(shapes_error("linear", left, right, expected));
         }
@@ -112,15 +112,10 @@ impl<T: Real> Tape<'_, T> {
             *last = outputs;
         }
         let mut y = self.take_for("linear", &shape)?;
-        let matrix = Mat::new(self.known().values(x), rows, inputs);
+        let matrix = Mat::new(self.values(x), rows, inputs);
         let out = MatMut::new(&mut y, rows, outputs);
         self.known().product_transposed(matrix, weight, out, false);
-        add_bias(
-            &mut y,
-            bias.map(|bias| self.known().values(bias)),
-            outputs,
-            relu,
-        );
+        add_bias(&mut y, bias.map(|bias| self.values(bias)), outputs, relu);
         Ok(self.put("linear", &all, &shape, y, || Linear {
             x,
             weight,
@@ -173,7 +168,7 @@ pub(super) mod gradient {
                 let first = tape.linear(v[0], v[2], bias, relu)?;
                 let second = tape.linear(v[1], v[2], bias, relu)?;
                 let second = tape.reshape(second, &[2, outputs])?;
-                let (a, b) = (tape.sum(first)?, tape.square(second)?);
+                let (a, b) = (tape.sum(first), tape.square(second));
                 tape.add(a, b)
             })
         })

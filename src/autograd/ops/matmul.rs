@@ -36,7 +36,7 @@ impl<T: Real> Tape<'_, T> {
     /// Operands that are no matrices, or whose inner axes differ.
     pub fn matmul(&mut self, a: Var, b: Var) -> Result<Var, AutogradError> {
         self.own("matmul", &[a, b])?;
-        let (left, right) = (self.known().shape(a), self.known().shape(b));
+        let (left, right) = (self.shape(a), self.shape(b));
         let (&[m, k], &[inner, n]) = (left, right) else {
             return Err(shapes_error("matmul", left, right, "[m, k] and [k, n]"));
         };
@@ -45,8 +45,8 @@ impl<T: Real> Tape<'_, T> {
         }
         let mut y = self.take_for("matmul", &[m, n])?;
         product(
-            Mat::new(self.known().values(a), m, k),
-            Mat::new(self.known().values(b), k, n),
+            Mat::new(self.values(a), m, k),
+            Mat::new(self.values(b), k, n),
             MatMut::new(&mut y, m, n),
             false,
         );

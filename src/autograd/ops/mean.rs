@@ -14,14 +14,14 @@ impl<T: Real> Tape<'_, T> {
     /// A value without numbers, a value of another tape.
     pub fn mean(&mut self, x: Var) -> Result<Var, AutogradError> {
         self.own("mean", &[x])?;
-        let count = self.known().values(x).len();
+        let count = self.values(x).len();
         if count == 0 {
-            let shape = self.known().shape(x);
+            let shape = self.shape(x);
             let expected = "at least one number";
             return Err(argument_error("mean", shape, "nothing".into(), expected));
         }
-        let sum = self.sum(x)?;
-        self.affine(sum, 1.0 / count as f64, 0.0)
+        let sum = self.sum(x);
+        Ok(self.affine(sum, 1.0 / count as f64, 0.0))
     }
 
     /// Mean of the squared differences of all numbers, as `[1]`: a loss.
@@ -30,13 +30,13 @@ impl<T: Real> Tape<'_, T> {
     /// Other shapes than one another's, values without numbers or of another tape.
     pub fn mean_squared_error(&mut self, x: Var, target: Var) -> Result<Var, AutogradError> {
         self.own("mean_squared_error", &[x, target])?;
-        let (left, right) = (self.known().shape(x), self.known().shape(target));
+        let (left, right) = (self.shape(x), self.shape(target));
         if left != right {
             let expected = "equal shapes";
             return Err(shapes_error("mean_squared_error", left, right, expected));
         }
         let difference = self.sub(x, target)?;
-        let squares = self.square(difference)?;
+        let squares = self.square(difference);
         self.mean(squares)
     }
 }

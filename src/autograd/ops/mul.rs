@@ -37,15 +37,9 @@ impl<T: Real> Tape<'_, T> {
     /// Shapes that do not broadcast together.
     pub fn mul(&mut self, a: Var, b: Var) -> Result<Var, AutogradError> {
         self.own("mul", &[a, b])?;
-        let shape = broadcast_shape("mul", self.known().shape(a), self.known().shape(b))?;
+        let shape = broadcast_shape("mul", self.shape(a), self.shape(b))?;
         let mut y = self.take_for("mul", &shape)?;
-        zip_into(
-            &mut y,
-            &shape,
-            self.known().array(a),
-            self.known().array(b),
-            |x, y| x * y,
-        );
+        zip_into(&mut y, &shape, self.array(a), self.array(b), |x, y| x * y);
         Ok(self.put("mul", &[a, b], &shape, y, || Mul {
             a,
             b,

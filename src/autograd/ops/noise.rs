@@ -25,15 +25,15 @@ impl<T: Real> Operation<T> for Noise {
 impl<T: Real> Tape<'_, T> {
     /// `x` with noise of this standard deviation on each number, drawn by the key of the tape's
     /// dropout; `x` itself where dropout is off.
-    ///
-    /// # Errors
-    /// A deviation below 0 or without an end; a value of another tape.
-    pub fn noise(&mut self, x: Var, deviation: f64) -> Result<Var, AutogradError> {
-        self.own("noise", &[x])?;
+    pub fn noise(&mut self, x: Var, deviation: f64) -> Var {
         let valid = deviation >= 0.0 && deviation.is_finite();
-        AutogradError::unless(valid, "noise", ("deviation", deviation), "0 or more")?;
+        let asked = ("deviation", deviation);
+        let valid = AutogradError::unless(valid, "noise", asked, "a number, 0 or more");
+        if let Err(error) = valid.and(self.own("noise", &[x])) {
+            return self.refuse(error);
+        }
         let Some((key, deviation)) = self.next_key(deviation) else {
-            return Ok(x);
+            return x;
         };
         let (shape, mut y) = self.copy(x);
         let mut rng = ChaCha8Rng::seed_from_u64(key);
@@ -41,7 +41,7 @@ impl<T: Real> Tape<'_, T> {
             let drawn: f64 = StandardNormal.sample(&mut rng);
             *y += T::from_f64(deviation * drawn);
         }
-        Ok(self.put("noise", &[x], &shape, y, || Noise { x }))
+        self.put("noise", &[x], &shape, y, || Noise { x })
     }
 }
 
@@ -53,7 +53,7 @@ pub(super) mod gradient {
         drawn((shapes(), 0.0..2.0), |(x, deviation), seed| {
             case(&[&x], seed, 0.0, move |tape, v| {
                 tape.set_dropout(Some(seed));
-                tape.noise(v[0], deviation)
+                Ok(tape.noise(v[0], deviation))
             })
         })
     }

@@ -7,17 +7,14 @@
 
 use super::unary::unary;
 use crate::autograd::kernels::vectorised;
-use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::autograd::{Real, Tape, Var};
 
 const ALPHA: f64 = 0.1;
 const C: f64 = 1.0;
 
 impl<T: Real> Tape<'_, T> {
     /// x between -1 and 1, with slope 0.1 outside, elementwise.
-    ///
-    /// # Errors
-    /// A value of another tape.
-    pub fn plu(&mut self, x: Var) -> Result<Var, AutogradError> {
+    pub fn plu(&mut self, x: Var) -> Var {
         let (alpha, c) = (T::from_f64(ALPHA), T::from_f64(C));
         unary(
             self,
@@ -57,8 +54,8 @@ pub(super) mod gradient {
             let kink = if upper { super::C } else { -super::C };
             case(&[&x], seed, 0.01, move |tape, v| {
                 // Halved, they stay clear of the other kink.
-                let shifted = tape.affine(v[0], 0.5, kink)?;
-                tape.plu(shifted)
+                let shifted = tape.affine(v[0], 0.5, kink);
+                Ok(tape.plu(shifted))
             })
         })
     }

@@ -55,13 +55,13 @@ impl<T: Real> Tape<'_, T> {
     /// A slope that is not one number.
     pub fn prelu(&mut self, x: Var, slope: Var) -> Result<Var, AutogradError> {
         self.own("prelu", &[x, slope])?;
-        if self.known().values(slope).len() != 1 {
-            let (left, right) = (self.known().shape(x), self.known().shape(slope));
+        if self.values(slope).len() != 1 {
+            let (left, right) = (self.shape(x), self.shape(slope));
             return Err(shapes_error("prelu", left, right, "one slope"));
         }
-        let shape = self.known().shape(x).to_vec();
-        let mut y = self.take(self.known().values(x).len());
-        let (values, a) = (self.known().values(x), self.known().values(slope)[0]);
+        let shape = self.shape(x).to_vec();
+        let mut y = self.take(self.values(x).len());
+        let (values, a) = (self.values(x), self.values(slope)[0]);
         vectorised(
             #[inline(always)]
             || {

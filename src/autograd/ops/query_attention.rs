@@ -224,9 +224,9 @@ impl<T: Real> Tape<'_, T> {
         let mut m = self.take(batch * heads * padded);
         let mut y = self.take(batch * all);
         let mut scratch = self.take(shape.scratch_len());
-        let (known, rows) = (self.known(), sizes.rows(self.known().values(x)));
+        let (known, rows) = (self.known(), sizes.rows(self.values(x)));
         for (h, &weight) in weights.keys.iter().enumerate() {
-            let q_h = Mat::new(self.known().values(q), batch, all).columns(sizes.head(h));
+            let q_h = Mat::new(self.values(q), batch, all).columns(sizes.head(h));
             let u = MatMut::new(&mut u, batch, heads * width);
             known.product(q_h, weight, u.columns(sizes.tokens_of_head(h)), false);
         }
@@ -243,7 +243,7 @@ impl<T: Real> Tape<'_, T> {
             rows,
         };
         sums.put(&mut z, (0, width), shape, false, &mut scratch);
-        let bias = self.known().values(weights.value_bias);
+        let bias = self.values(weights.value_bias);
         for (row, y) in y.chunks_exact_mut(dh).enumerate() {
             let sum: T = m[row * padded..(row + 1) * padded].iter().copied().sum();
             let bias = &bias[sizes.head(row % heads)];
@@ -281,7 +281,7 @@ impl<T: Real> Tape<'_, T> {
         weights: &QueryAttentionWeights,
         tokens: usize,
     ) -> Result<Sizes, AutogradError> {
-        let (left, right) = (self.known().shape(q), self.known().shape(x));
+        let (left, right) = (self.shape(q), self.shape(x));
         let (batch, all, width) = match (left, right) {
             (&[batch, all], &[rows, width])
                 if tokens > 0 && width > 0 && batch.checked_mul(tokens) == Some(rows) =>
@@ -297,26 +297,18 @@ impl<T: Real> Tape<'_, T> {
         if heads == 0 || weights.values.len() != heads || all == 0 || all % heads != 0 {
             let argument = format!("{heads} heads");
             let expected = "as many W_k as W_v, a number that divides the queries' width";
-            return Err(argument_error(
-                NAME,
-                self.known().shape(q),
-                argument,
-                expected,
-            ));
+            return Err(argument_error(NAME, self.shape(q), argument, expected));
         }
         let head_width = all / heads;
         for &weight in weights.keys.iter().chain(&weights.values) {
-            if self.known().shape(weight) != [head_width, width] {
-                let (left, right) = (self.known().shape(x), self.known().shape(weight));
+            if self.shape(weight) != [head_width, width] {
+                let (left, right) = (self.shape(x), self.shape(weight));
                 let expected = "x [B * n, d'] and weights [d / heads, d']";
                 return Err(shapes_error(NAME, left, right, expected));
             }
         }
-        if self.known().shape(weights.value_bias) != [all] {
-            let (left, right) = (
-                self.known().shape(q),
-                self.known().shape(weights.value_bias),
-            );
+        if self.shape(weights.value_bias) != [all] {
+            let (left, right) = (self.shape(q), self.shape(weights.value_bias));
             return Err(shapes_error(NAME, left, right, "q [B, d] and bias [d]"));
         }
         Ok(Sizes {
@@ -353,7 +345,7 @@ pub(super) mod gradient {
                     values: vec![v[4], v[5]],
                     value_bias: v[6],
                 };
-                let queries = tape.affine(v[0], strength, 0.0)?;
+                let queries = tape.affine(v[0], strength, 0.0);
                 tape.query_attention(queries, v[1], weights, tokens, 0.3)
             })
         })

@@ -27,17 +27,12 @@ impl<T: Real> Tape<'_, T> {
     pub fn reshape(&mut self, x: Var, shape: &[usize]) -> Result<Var, AutogradError> {
         self.own("reshape", &[x])?;
         let numbers = shape.iter().try_fold(1, |n: usize, &k| n.checked_mul(k));
-        if numbers != Some(self.known().values(x).len()) {
+        if numbers != Some(self.values(x).len()) {
             let expected = "as many numbers on both sides";
-            return Err(shapes_error(
-                "reshape",
-                self.known().shape(x),
-                shape,
-                expected,
-            ));
+            return Err(shapes_error("reshape", self.shape(x), shape, expected));
         }
         let mut y = self.take_for("reshape", shape)?;
-        y.copy_from_slice(self.known().values(x));
+        y.copy_from_slice(self.values(x));
         Ok(self.put("reshape", &[x], shape, y, || Reshape { x }))
     }
 }

@@ -17,7 +17,7 @@ impl<T: Real> Tape<'_, T> {
     /// A range beyond the first axis.
     pub fn rows(&mut self, x: Var, range: Range<usize>) -> Result<Var, AutogradError> {
         self.own("rows", &[x])?;
-        let mut shape = self.known().shape(x).to_vec();
+        let mut shape = self.shape(x).to_vec();
         let total = shape.first().copied().unwrap_or(0);
         if shape.is_empty() || range.start > range.end || range.end > total {
             let argument = format!("rows {range:?}");

@@ -32,7 +32,7 @@ impl<T: Real> Tape<'_, T> {
         p: f64,
     ) -> Result<Var, AutogradError> {
         self.own("shared_attention", &[q, x])?;
-        let (left, right) = (self.known().shape(q), self.known().shape(x));
+        let (left, right) = (self.shape(q), self.shape(x));
         let (&[rows, all], &[others, width]) = (left, right) else {
             let expected = "q [rows, heads * c] and x [rows, c]";
             return Err(shapes_error("shared_attention", left, right, expected));

@@ -35,18 +35,18 @@ impl<T: Real> Tape<'_, T> {
             return Err(argument_error("stack", &[], "no parts".into(), expected));
         };
         for &part in parts {
-            if self.known().shape(part) != self.known().shape(first) {
-                let (left, right) = (self.known().shape(first), self.known().shape(part));
+            if self.shape(part) != self.shape(first) {
+                let (left, right) = (self.shape(first), self.shape(part));
                 return Err(shapes_error("stack", left, right, "equal shapes"));
             }
         }
-        let len = self.known().values(first).len();
+        let len = self.values(first).len();
         let mut y = self.take(len * parts.len());
         for (k, &part) in parts.iter().enumerate() {
-            y[k * len..(k + 1) * len].copy_from_slice(self.known().values(part));
+            y[k * len..(k + 1) * len].copy_from_slice(self.values(part));
         }
         let mut shape = vec![parts.len()];
-        shape.extend_from_slice(self.known().shape(first));
+        shape.extend_from_slice(self.shape(first));
         Ok(self.put("stack", parts, &shape, y, || Stack {
             parts: parts.to_vec(),
         }))

@@ -20,7 +20,7 @@ impl<T: Real> Tape<'_, T> {
         step: usize,
     ) -> Result<Var, AutogradError> {
         self.own("strided_rows", &[x])?;
-        let mut shape = self.known().shape(x).to_vec();
+        let mut shape = self.shape(x).to_vec();
         let rows = shape.first().copied().unwrap_or(0);
         if shape.is_empty() || start >= step || rows % step != 0 {
             let argument = format!("rows from {start} in steps of {step}");

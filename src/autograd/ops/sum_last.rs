@@ -29,7 +29,7 @@ impl<T: Real> Tape<'_, T> {
     /// A value without axes.
     pub fn sum_last(&mut self, x: Var) -> Result<Var, AutogradError> {
         self.own("sum_last", &[x])?;
-        let Some((&columns, shape)) = self.known().shape(x).split_last() else {
+        let Some((&columns, shape)) = self.shape(x).split_last() else {
             let argument = "its last axis".into();
             return Err(argument_error(
                 "sum_last",
@@ -40,7 +40,7 @@ impl<T: Real> Tape<'_, T> {
         };
         let shape = shape.to_vec();
         let mut y = self.take_for("sum_last", &shape)?;
-        let values = self.known().values(x);
+        let values = self.values(x);
         for (row, y) in y.iter_mut().enumerate() {
             *y = sum_with(columns, |j| values[row * columns + j]);
         }

@@ -1,6 +1,6 @@
 //! What the elementwise functions of one value share.
 
-use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var};
+use crate::autograd::{Backward, Operation, Real, Tape, Var};
 
 struct Unary<D> {
     x: Var,
@@ -23,9 +23,11 @@ pub(super) fn unary<T: Real>(
     x: Var,
     forward: impl Fn(&mut [T]),
     derivative: impl Fn(T, T) -> T + Send + 'static,
-) -> Result<Var, AutogradError> {
-    tape.own(name, &[x])?;
+) -> Var {
+    if let Err(error) = tape.own(name, &[x]) {
+        return tape.refuse(error);
+    }
     let (shape, mut y) = tape.copy(x);
     forward(&mut y);
-    Ok(tape.put(name, &[x], &shape, y, || Unary { x, derivative }))
+    tape.put(name, &[x], &shape, y, || Unary { x, derivative })
 }

@@ -37,7 +37,7 @@ impl<T: Real> Tape<'_, T> {
     /// A value without axes; an `eps` that is not above 0.
     pub fn vector_norm(&mut self, x: Var, eps: f64) -> Result<Var, AutogradError> {
         self.own("vector_norm", &[x])?;
-        let Some((&columns, shape)) = self.known().shape(x).split_last() else {
+        let Some((&columns, shape)) = self.shape(x).split_last() else {
             let argument = "its last axis".into();
             let expected = "one axis or more";
             return Err(argument_error("vector_norm", &[], argument, expected));
@@ -45,7 +45,7 @@ impl<T: Real> Tape<'_, T> {
         let shape = shape.to_vec();
         let eps = smoothing("vector_norm", eps)?;
         let mut y = self.take_for("vector_norm", &shape)?;
-        let values = self.known().values(x);
+        let values = self.values(x);
         for (row, y) in y.iter_mut().enumerate() {
             let row = &values[row * columns..(row + 1) * columns];
             *y = (sum_with(columns, |j| row[j] * row[j]) + eps).sqrt();

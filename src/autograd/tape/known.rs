@@ -21,11 +21,11 @@ impl<T: Real> Clone for Known<'_, T> {
 impl<T: Real> Copy for Known<'_, T> {}
 
 impl<'s, T: Real> Known<'s, T> {
-    pub(in crate::autograd) fn shape(self, var: Var) -> &'s [usize] {
+    pub(super) fn shape(self, var: Var) -> &'s [usize] {
         self.nodes[var.index()].shape(self.parameters)
     }
 
-    pub(in crate::autograd) fn values(self, var: Var) -> &'s [T] {
+    pub(super) fn values(self, var: Var) -> &'s [T] {
         self.values_at(var.index())
     }
 
@@ -38,7 +38,7 @@ impl<'s, T: Real> Known<'s, T> {
         }
     }
 
-    pub(in crate::autograd) fn array(self, var: Var) -> ArrayViewD<'s, T> {
+    pub(super) fn array(self, var: Var) -> ArrayViewD<'s, T> {
         ArrayViewD::from_shape(IxDyn(self.shape(var)), self.values(var))
             .expect("a value has as many numbers as its shape says")
     }

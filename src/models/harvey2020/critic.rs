@@ -55,7 +55,7 @@ impl Critic {
         seen: Var,
         windows: usize,
     ) -> Result<Var, AutogradError> {
-        let rows = tape.shape(seen)?[0] - (self.frames - 1) * windows;
+        let rows = tape.shape(seen)[0] - (self.frames - 1) * windows;
         let parts = (0..self.frames)
             .map(|k| tape.rows(seen, k * windows..k * windows + rows))
             .collect::<Result<Vec<_>, _>>()?;
@@ -70,10 +70,10 @@ impl Critic {
         wanted: f64,
     ) -> Result<Var, AutogradError> {
         let scores = self.layers.forward(tape, slides)?;
-        let missing = tape.affine(scores, 1.0, -wanted)?;
-        let squares = tape.square(missing)?;
-        let sum = tape.sum(squares)?;
-        tape.affine(sum, 0.5, 0.0)
+        let missing = tape.affine(scores, 1.0, -wanted);
+        let squares = tape.square(missing);
+        let sum = tape.sum(squares);
+        Ok(tape.affine(sum, 0.5, 0.0))
     }
 }
 
@@ -86,8 +86,8 @@ pub(super) fn judge<T: Real>(
     windows: usize,
     total_windows: usize,
 ) -> Result<Judgement, AutogradError> {
-    let transition = tape.shape(predicted)?[0] / windows.max(1);
-    let zero = tape.constant_with(&[1], |out| out.fill(T::zero()))?;
+    let transition = tape.shape(predicted)[0] / windows.max(1);
+    let zero = tape.constant_with(&[1], |out| out.fill(T::zero()));
     let mut judgement = Judgement {
         generator: zero,
         critics: zero,
@@ -96,15 +96,12 @@ pub(super) fn judge<T: Real>(
         let mean = 1.0 / ((transition - critic.frames + 1) * total_windows) as f64;
         let slides = critic.slide(tape, predicted, windows)?;
         let judged = tape.frozen(|tape| critic.distance(tape, slides, 1.0))?;
-        let held = tape.detach(slides)?;
+        let held = tape.detach(slides);
         let taken = critic.distance(tape, held, 0.0)?;
         let slides = critic.slide(tape, recorded, windows)?;
         let missed = critic.distance(tape, slides, 1.0)?;
         let own = tape.add(taken, missed)?;
-        let (judged, own) = (
-            tape.affine(judged, mean, 0.0)?,
-            tape.affine(own, mean, 0.0)?,
-        );
+        let (judged, own) = (tape.affine(judged, mean, 0.0), tape.affine(own, mean, 0.0));
         judgement.generator = tape.add(judgement.generator, judged)?;
         judgement.critics = tape.add(judgement.critics, own)?;
     }

@@ -78,14 +78,14 @@ impl Frames {
         windows: usize,
         scales: Scales,
     ) -> Result<Var, AutogradError> {
-        let rows = tape.shape(self.relative)?[0];
+        let rows = tape.shape(self.relative)[0];
         let joints = tape.rows(self.relative, windows..rows)?;
         let joints = tape.columns(joints, 3..3 * JOINTS)?;
-        let joints = tape.affine(joints, 1.0 / scales.position, 0.0)?;
+        let joints = tape.affine(joints, 1.0 / scales.position, 0.0);
         let now = tape.rows(self.placed, windows..rows)?;
         let before = tape.rows(self.placed, 0..rows - windows)?;
         let velocities = tape.sub(now, before)?;
-        let velocities = tape.affine(velocities, 1.0 / scales.velocity, 0.0)?;
+        let velocities = tape.affine(velocities, 1.0 / scales.velocity, 0.0);
         tape.concat(&[joints, velocities])
     }
 }
@@ -100,35 +100,28 @@ pub(super) fn joints<T: Real>(
     let offsets = tape.constant_with(&[given.windows, OFFSETS], |out| {
         let offsets = given.poses.offsets.iter();
         out.iter_mut().zip(offsets).for_each(|(out, &x)| *out = x);
-    })?;
+    });
     tape.forward_kinematics(rotations, offsets, &DANCE_PARENTS)
 }
 
 /// A constant `[windows, columns]`.
-pub(super) fn constant<T: Real>(
-    tape: &mut Tape<'_, T>,
-    windows: usize,
-    values: &[T],
-) -> Result<Var, AutogradError> {
+pub(super) fn constant<T: Real>(tape: &mut Tape<'_, T>, windows: usize, values: &[T]) -> Var {
     let columns = values.len() / windows.max(1);
     tape.constant_with(&[windows, columns], |out| out.copy_from_slice(values))
 }
 
 /// The recorded motion.
-fn recorded<T: Real>(
-    tape: &mut Tape<'_, T>,
-    given: &GivenWindows<'_, T>,
-) -> Result<PredictedFrames, AutogradError> {
-    let mut frames = |of: &dyn Fn(usize) -> Vec<T>| -> Result<Vec<Var>, AutogradError> {
+fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &GivenWindows<'_, T>) -> PredictedFrames {
+    let mut frames = |of: &dyn Fn(usize) -> Vec<T>| -> Vec<Var> {
         (0..=given.transition)
             .map(|row| constant(tape, given.windows, &of(row)))
             .collect()
     };
-    Ok(PredictedFrames {
-        rotations: frames(&|row| given.rotations(row))?,
-        roots: frames(&|row| given.roots(row))?,
-        contacts: frames(&|row| given.contacts(row))?,
-    })
+    PredictedFrames {
+        rotations: frames(&|row| given.rotations(row)),
+        roots: frames(&|row| given.roots(row)),
+        contacts: frames(&|row| given.contacts(row)),
+    }
 }
 
 /// All terms of a predicted motion; `total_windows` as in [`crate::models::transition::Batch`].
@@ -148,17 +141,17 @@ pub(super) fn terms<T: Real>(
     predicted: &PredictedFrames,
     total_windows: usize,
 ) -> Result<LossTerms, AutogradError> {
-    let recorded = recorded(tape, given)?;
+    let recorded = recorded(tape, given);
     let recorded = Frames::new(tape, &recorded, given)?;
     let predicted = Frames::new(tape, predicted, given)?;
     let frames = given.transition * total_windows;
     // Keyframe k1 stands on both sides and adds nothing.
     let mut distance = |a: Var, b: Var, unit: f64| -> Result<Var, AutogradError> {
-        let columns = tape.shape(a)?[1];
+        let columns = tape.shape(a).last().copied().unwrap_or(0);
         let difference = tape.sub(a, b)?;
-        let sizes = tape.abs(difference)?;
-        let sum = tape.sum(sizes)?;
-        tape.affine(sum, 1.0 / (unit * (frames * columns) as f64), 0.0)
+        let sizes = tape.abs(difference);
+        let sum = tape.sum(sizes);
+        Ok(tape.affine(sum, 1.0 / (unit * (frames * columns) as f64), 0.0))
     };
     let quaternion = distance(predicted.rotations, recorded.rotations, QUATERNION_UNIT)?;
     let root = distance(predicted.roots, recorded.roots, scales.position)?;

@@ -120,17 +120,17 @@ impl Harvey2020 {
         given: &GivenWindows<'_, T>,
     ) -> Result<Rollout<'n>, AutogradError> {
         let windows = given.windows;
-        let velocity = constant(tape, windows, &given.root_velocities())?;
+        let velocity = constant(tape, windows, &given.root_velocities());
         let state = State {
-            rotations: constant(tape, windows, &given.rotations(0))?,
-            root: constant(tape, windows, &given.roots(0))?,
-            velocity: tape.affine(velocity, 1.0 / self.root_velocity_scale, 0.0)?,
-            contacts: constant(tape, windows, &given.contacts(0))?,
+            rotations: constant(tape, windows, &given.rotations(0)),
+            root: constant(tape, windows, &given.roots(0)),
+            velocity: tape.affine(velocity, 1.0 / self.root_velocity_scale, 0.0),
+            contacts: constant(tape, windows, &given.contacts(0)),
         };
-        let target_rotations = constant(tape, windows, &given.target_rotations())?;
-        let target_root = constant(tape, windows, &given.roots(given.transition))?;
+        let target_rotations = constant(tape, windows, &given.target_rotations());
+        let target_root = constant(tape, windows, &given.roots(given.transition));
         let target_code = self.target_encoder.forward(tape, target_rotations)?;
-        let joint_velocities = constant(tape, windows, &given.body_velocities())?;
+        let joint_velocities = constant(tape, windows, &given.body_velocities());
         let first = tape.concat(&[
             state.rotations,
             state.velocity,
@@ -138,8 +138,7 @@ impl Harvey2020 {
             joint_velocities,
         ])?;
         let memory = self.initial_state.forward(tape, first)?;
-        let none =
-            tape.constant_with(&[windows, 2 * self.config.code], |out| out.fill(T::zero()))?;
+        let none = tape.constant_with(&[windows, 2 * self.config.code], |out| out.fill(T::zero()));
         Ok(Rollout {
             network: self,
             transition: given.transition,
@@ -148,7 +147,7 @@ impl Harvey2020 {
             target_rotations,
             target_root,
             target_code,
-            noise: tape.noise(none, self.config.target_noise)?,
+            noise: tape.noise(none, self.config.target_noise),
         })
     }
 }
@@ -184,14 +183,14 @@ impl Rollout<'_> {
         let state = tape.concat(&[rotations, velocity, contacts])?;
         let state_code = network.state_encoder.forward(tape, state)?;
         let way = tape.sub(self.target_root, root)?;
-        let way = tape.affine(way, 1.0 / network.root_scale, 0.0)?;
+        let way = tape.affine(way, 1.0 / network.root_scale, 0.0);
         let turns = tape.sub(self.target_rotations, rotations)?;
         let offset = tape.concat(&[way, turns])?;
         let offset_code = network.offset_encoder.forward(tape, offset)?;
         let mut codes = tape.concat(&[offset_code, self.target_code])?;
         let share = network.config.noise_share(arrival);
         if share > 0.0 {
-            let noise = tape.affine(self.noise, share, 0.0)?;
+            let noise = tape.affine(self.noise, share, 0.0);
             codes = tape.add(codes, noise)?;
         }
         let codes = tape.concat(&[state_code, codes])?;
@@ -201,22 +200,22 @@ impl Rollout<'_> {
         let embedding = tape.constant_with(&[embedding.len()], |out| {
             let values = embedding.iter().map(|&x| T::from_f64(x));
             out.iter_mut().zip(values).for_each(|(out, x)| *out = x);
-        })?;
+        });
         let codes = tape.add(codes, embedding)?;
         let (hidden, memory) = network.lstm.step(tape, codes, self.memory)?;
         self.memory = memory;
         let decoded = network.decoder.forward(tape, hidden)?;
         let changes = tape.columns(decoded, 0..ROTATIONS)?;
-        let changes = tape.affine(changes, QUATERNION_CHANGE, 0.0)?;
+        let changes = tape.affine(changes, QUATERNION_CHANGE, 0.0);
         let changed = tape.add(rotations, changes)?;
         let velocity = tape.columns(decoded, ROTATIONS..ROTATIONS + 3)?;
-        let moved = tape.affine(velocity, network.root_velocity_scale, 0.0)?;
+        let moved = tape.affine(velocity, network.root_velocity_scale, 0.0);
         let contacts = tape.columns(decoded, ROTATIONS + 3..STATE)?;
         self.state = State {
             rotations: tape.normalise(changed, 4, NORM_EPS)?,
             root: tape.add(root, moved)?,
             velocity,
-            contacts: tape.sigmoid(contacts)?,
+            contacts: tape.sigmoid(contacts),
         };
         Ok(())
     }
@@ -292,7 +291,7 @@ impl<T: Real> Network<T> for Harvey2020 {
         for t in 0..transition {
             rollout.step(tape, t)?;
             let joints = joints(tape, &given, rollout.state.rotations)?;
-            let (roots, joints) = (tape.values(rollout.state.root)?, tape.values(joints)?);
+            let (roots, joints) = (tape.values(rollout.state.root), tape.values(joints));
             for (window, world) in world.iter_mut().enumerate() {
                 let root = vector(&roots[3 * window..]);
                 let joints = joints[3 * JOINTS * window..].chunks_exact(3).take(JOINTS);
@@ -302,11 +301,11 @@ impl<T: Real> Network<T> for Harvey2020 {
                         .collect::<Vec<_>>(),
                 );
             }
-            let labels = tape.values(rollout.state.contacts)?;
+            let labels = tape.values(rollout.state.contacts);
             for (place, &label) in contacts.slice_mut(s![.., t, ..]).iter_mut().zip(labels) {
                 *place = Real::to_f64(label);
             }
-            tape.forget_since(mark, &mut rollout.keep())?;
+            tape.forget_since(mark, &mut rollout.keep());
         }
         let mut predicted = Array3::from_elem((transition, windows, FRAME), T::zero());
         for (window, world) in world.iter().enumerate() {

@@ -131,7 +131,7 @@ impl ControlPath {
                 })
             })
             .collect();
-        let seen = self.seen(tape, units, &frames)?;
+        let seen = self.seen(tape, units, &frames);
         let corrections = self.mean_of_members(tape, |tape, member| {
             let hidden = member.hidden.forward(tape, seen.input)?;
             member.last.forward(tape, hidden)
@@ -181,20 +181,20 @@ impl ControlPath {
                     *out = truth - mean;
                 }
             }
-        })?;
-        let seen = self.seen(tape, units, &frames)?;
+        });
+        let seen = self.seen(tape, units, &frames);
         let sum = self.mean_of_members(tape, |tape, member| {
             let hidden = member.hidden.forward(tape, seen.input)?;
-            let hidden = tape.dropout(hidden, DROPOUT)?;
+            let hidden = tape.dropout(hidden, DROPOUT);
             let corrections = member.last.forward(tape, hidden)?;
             let corrections = tape.mul(corrections, seen.residual_deviation)?;
             let error = tape.sub(missed, corrections)?;
             let error = units.in_scale(tape, error)?;
             let distances = tape.vector_norm(error, NORM_EPS)?;
-            tape.sum(distances)
+            Ok(tape.sum(distances))
         })?;
         let mean = 1.0 / batch.total_single_frames.max(1) as f64;
-        tape.affine(sum, mean, 0.0)
+        Ok(tape.affine(sum, mean, 0.0))
     }
 
     fn mean_of_members<'p, T: Real>(
@@ -207,7 +207,7 @@ impl ControlPath {
             let next = of(tape, member)?;
             sum = tape.add(sum, next)?;
         }
-        tape.affine(sum, 1.0 / (1 + self.others.len()) as f64, 0.0)
+        Ok(tape.affine(sum, 1.0 / (1 + self.others.len()) as f64, 0.0))
     }
 
     fn seen<T: Real>(
@@ -215,7 +215,7 @@ impl ControlPath {
         tape: &mut Tape<'_, T>,
         units: &Units,
         frames: &[SeenFrame<'_, T>],
-    ) -> Result<Seen, AutogradError> {
+    ) -> Seen {
         let half = seen(self.velocity_factor);
         let deviations: Vec<T> = frames
             .iter()
@@ -234,12 +234,12 @@ impl ControlPath {
                     *scaled = deviation * plain;
                 }
             }
-        })?;
-        Ok(Seen {
+        });
+        Seen {
             input,
             residual_deviation: tape
-                .constant_with(&[frames.len(), 1], |out| out.copy_from_slice(&deviations))?,
-        })
+                .constant_with(&[frames.len(), 1], |out| out.copy_from_slice(&deviations)),
+        }
     }
 
     /// Appends what is seen of a frame.

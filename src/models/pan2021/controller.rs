@@ -195,7 +195,7 @@ impl TransformerController {
                     }
                 })
             })
-            .collect::<Result<_, _>>()?;
+            .collect();
         let encoder = &self.encoder[0].self_attention;
         let decoder = &self.decoder[0].self_attention;
         Ok(Composed {
@@ -214,9 +214,9 @@ impl TransformerController {
         attention: &MultiHeadAttention,
     ) -> Result<Embedding, AutogradError> {
         let (u, d) = self.positions.dim();
-        let (weight, bias) = (tape.block(embedding.weight)?, tape.block(embedding.bias)?);
-        let channels = tape.shape(weight)?[1];
-        let positions = constant(tape, &[d, u], self.positions.t())?;
+        let (weight, bias) = (tape.block(embedding.weight), tape.block(embedding.bias));
+        let channels = tape.shape(weight).last().copied().unwrap_or(0);
+        let positions = constant(tape, &[d, u], self.positions.t());
         let bias = tape.reshape(bias, &[d, 1])?;
         let positions = tape.add(positions, bias)?;
         let token = tape.concat(&[weight, positions])?;
@@ -225,7 +225,7 @@ impl TransformerController {
         let identity = tape.constant_with(&[k, k], |out| {
             out.fill(T::zero());
             out.iter_mut().step_by(k + 1).for_each(|x| *x = T::one());
-        })?;
+        });
         let basis = tape.linear(identity, token, None, false)?;
         Ok(Embedding {
             token,
@@ -317,17 +317,12 @@ impl<T: Real> Segments<T> {
     }
 
     /// The mixture segment for the prediction of frame `t + 1`, one `[windows, c]` a position.
-    fn mixture(
-        &self,
-        tape: &mut Tape<'_, T>,
-        t: usize,
-        fed: impl Fn(usize) -> Var,
-    ) -> Result<Vec<Var>, AutogradError> {
+    fn mixture(&self, tape: &mut Tape<'_, T>, t: usize, fed: impl Fn(usize) -> Var) -> Vec<Var> {
         (0..self.window)
             .map(|j| {
                 let frame = self.frame_at(t, j);
                 if frame <= t {
-                    return Ok(fed(frame));
+                    return fed(frame);
                 }
                 let shape = [self.trajectory.windows, self.channels];
                 tape.constant_with(&shape, |out| out.copy_from_slice(self.frame(frame)))
@@ -399,7 +394,7 @@ impl Coder<'_> {
             for (row, token) in out.chunks_exact_mut(c + u).enumerate() {
                 token[c + row % u] = T::one();
             }
-        })?;
+        });
         let embedding = self.composed.target;
         let (tokens, projected) = self.transformer.encode(tape, embedding, targets, u)?;
         Ok(Memory {
@@ -426,13 +421,13 @@ impl<T: Real> Session<'_, T> {
         fed: impl Fn(usize) -> Var,
     ) -> Result<Var, AutogradError> {
         let segments = &self.segments;
-        let mixture = segments.mixture(tape, t, fed)?;
+        let mixture = segments.mixture(tape, t, fed);
         match &mut self.kind {
             SessionKind::FullyConnected(mlp) => {
                 let width = segments.window * segments.channels;
                 let target = tape.constant_with(&[segments.trajectory.windows, width], |out| {
                     segments.write_target(t, out, 0);
-                })?;
+                });
                 let parts: Vec<Var> = std::iter::once(target).chain(mixture).collect();
                 let both = tape.concat(&parts)?;
                 mlp.forward(tape, both)

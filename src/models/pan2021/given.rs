@@ -57,15 +57,7 @@ impl<'f, T: Real> GivenFrames<'f, T> {
     }
 
     /// Columns of frame k1 + `t` as a constant, `[windows, columns]`.
-    ///
-    /// # Errors
-    /// More windows than memory holds.
-    pub fn constant(
-        &self,
-        tape: &mut Tape<'_, T>,
-        t: usize,
-        columns: Range<usize>,
-    ) -> Result<Var, AutogradError> {
+    pub fn constant(&self, tape: &mut Tape<'_, T>, t: usize, columns: Range<usize>) -> Var {
         tape.constant_with(&[self.windows, columns.len()], |out| {
             let rows = out.chunks_exact_mut(columns.len());
             for (out, row) in rows.zip(self.frame(t)) {

@@ -72,19 +72,19 @@ pub(super) fn terms<T: Real>(
     let root = root_smoothness(tape, &frames)?;
     let key = keyframe(tape, &frames, batch, weights.key_frames)?;
     let mut all = vec![
-        ("rec", weights.rec, tape.affine(rec, mean, 0.0)?),
-        ("bone", weights.con, tape.affine(bone, mean, 0.0)?),
-        ("contact", weights.con, tape.affine(contact, mean, 0.0)?),
-        ("velocity", weights.con, tape.affine(velocity, mean, 0.0)?),
-        ("root", weights.root, tape.affine(root, mean, 0.0)?),
+        ("rec", weights.rec, tape.affine(rec, mean, 0.0)),
+        ("bone", weights.con, tape.affine(bone, mean, 0.0)),
+        ("contact", weights.con, tape.affine(contact, mean, 0.0)),
+        ("velocity", weights.con, tape.affine(velocity, mean, 0.0)),
+        ("root", weights.root, tape.affine(root, mean, 0.0)),
         // The weights of eq. 10 hold the mean over the frames.
         ("key", weights.key, {
-            tape.affine(key, 1.0 / batch.total_windows as f64, 0.0)?
+            tape.affine(key, 1.0 / batch.total_windows as f64, 0.0)
         }),
     ];
     if config.velocity_factor {
         let vfac = velocity_factor(tape, units, batch, velocities)?;
-        all.push(("vfac", weights.vfac, tape.affine(vfac, mean, 0.0)?));
+        all.push(("vfac", weights.vfac, tape.affine(vfac, mean, 0.0)));
     }
     if let Some(loss) = single_frames {
         all.push(("single_frames", weights.single_frames, loss));
@@ -97,7 +97,7 @@ fn truth<T: Real>(
     tape: &mut Tape<'_, T>,
     batch: &Batch<T>,
     columns: std::ops::Range<usize>,
-) -> Result<Var, AutogradError> {
+) -> Var {
     let (frames, windows, _) = batch.features.dim();
     let rows = (frames - 1) * windows;
     tape.constant_with(&[rows, columns.len()], |out| {
@@ -109,8 +109,8 @@ fn truth<T: Real>(
     })
 }
 
-fn sum_of_squares<T: Real>(tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
-    let squares = tape.square(x)?;
+fn sum_of_squares<T: Real>(tape: &mut Tape<'_, T>, x: Var) -> Var {
+    let squares = tape.square(x);
     tape.sum(squares)
 }
 
@@ -120,9 +120,9 @@ fn reconstruction<T: Real>(
     frames: &Frames,
     batch: &Batch<T>,
 ) -> Result<Var, AutogradError> {
-    let truth = truth(tape, batch, 0..FRAME)?;
+    let truth = truth(tape, batch, 0..FRAME);
     let difference = tape.sub(frames.predicted, truth)?;
-    sum_of_squares(tape, difference)
+    Ok(sum_of_squares(tape, difference))
 }
 
 /// L_bone, eq. 6: sum over bones of ((length~ - length) / s_p)^2, the length that of keyframe k1;
@@ -146,10 +146,10 @@ fn bone_length<T: Real>(
         .collect();
     let bones = JOINTS - 1;
     let lengths = tape.reshape(lengths, &[frames.transition, frames.windows, bones])?;
-    let wanted = constant(tape, &[frames.windows, bones], &wanted)?;
+    let wanted = constant(tape, &[frames.windows, bones], &wanted);
     let difference = tape.sub(lengths, wanted)?;
-    let difference = tape.affine(difference, 1.0 / units.position_scale, 0.0)?;
-    sum_of_squares(tape, difference)
+    let difference = tape.affine(difference, 1.0 / units.position_scale, 0.0);
+    Ok(sum_of_squares(tape, difference))
 }
 
 /// L_contact, eq. 7: sum over foot joints of c~ |v~| / s_v, with c~ clamped to [0, 1]; in units of
@@ -160,16 +160,16 @@ fn contact<T: Real>(
     frames: &Frames,
 ) -> Result<Var, AutogradError> {
     let labels = tape.columns(frames.predicted, CONTACTS)?;
-    let std = constant(tape, &[4], &units.contact_std)?;
-    let mean = constant(tape, &[4], &units.contact_mean)?;
+    let std = constant(tape, &[4], &units.contact_std);
+    let mean = constant(tape, &[4], &units.contact_mean);
     let labels = tape.mul(labels, std)?;
     let labels = tape.add(labels, mean)?;
-    let labels = tape.clamp(labels, 0.0, 1.0)?;
+    let labels = tape.clamp(labels, 0.0, 1.0);
     let velocities = tape.columns(frames.predicted, BODY_VELOCITIES)?;
     let speeds = units.foot_speeds(tape, velocities)?;
     let product = tape.mul(labels, speeds)?;
-    let sum = tape.sum(product)?;
-    tape.affine(sum, 1.0 / units.velocity_scale, 0.0)
+    let sum = tape.sum(product);
+    Ok(tape.affine(sum, 1.0 / units.velocity_scale, 0.0))
 }
 
 /// L_velocity, eq. 8: sum over all joints of |v~_t - (p~_t - p~_{t-1})|^2 / s_v^2; in units of s_v.
@@ -183,11 +183,11 @@ fn velocity_consistency<T: Real>(
     let now = tape.columns(frames.predicted, POSITIONS)?;
     let before = tape.columns(frames.before, POSITIONS)?;
     let moved = tape.sub(now, before)?;
-    let std = constant(tape, &[POSITIONS.len()], &units.position_std)?;
+    let std = constant(tape, &[POSITIONS.len()], &units.position_std);
     let moved = tape.mul(moved, std)?;
     let difference = tape.sub(velocities, moved)?;
-    let difference = tape.affine(difference, 1.0 / units.velocity_scale, 0.0)?;
-    sum_of_squares(tape, difference)
+    let difference = tape.affine(difference, 1.0 / units.velocity_scale, 0.0);
+    Ok(sum_of_squares(tape, difference))
 }
 
 /// L_root, eq. 9: sum over p^r, o^r of (z~_t - z~_{t-1})^2; standardised.
@@ -195,7 +195,7 @@ fn root_smoothness<T: Real>(tape: &mut Tape<'_, T>, frames: &Frames) -> Result<V
     let now = tape.columns(frames.predicted, ROOT)?;
     let before = tape.columns(frames.before, ROOT)?;
     let difference = tape.sub(now, before)?;
-    sum_of_squares(tape, difference)
+    Ok(sum_of_squares(tape, difference))
 }
 
 /// Weights of frame t (1 .. N after k1) for k1 and k2 in eq. 10.
@@ -227,7 +227,7 @@ fn keyframe<T: Real>(
     let positions = tape.columns(frames.predicted, POSITIONS)?;
     let positions = tape.reshape(positions, &[n, windows, POSITIONS.len()])?;
     let weights: Vec<(f64, f64)> = (1..=n).map(|t| keyframe_weights(t, n, m)).collect();
-    let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()))?;
+    let mut total = tape.constant_with(&[1], |out| out.fill(T::zero()));
     for (frame, of) in [
         (0, weights.iter().map(|w| w.0).collect::<Vec<_>>()),
         (n, weights.iter().map(|w| w.1).collect()),
@@ -238,12 +238,12 @@ fn keyframe<T: Real>(
             for (out, row) in out.chunks_exact_mut(POSITIONS.len()).zip(rows) {
                 out.iter_mut().zip(row).for_each(|(out, &x)| *out = x);
             }
-        })?;
+        });
         let difference = tape.sub(positions, keyframe)?;
-        let squares = tape.square(difference)?;
-        let of = constant(tape, &[n, 1, 1], &of)?;
+        let squares = tape.square(difference);
+        let of = constant(tape, &[n, 1, 1], &of);
         let weighted = tape.mul(squares, of)?;
-        let sum = tape.sum(weighted)?;
+        let sum = tape.sum(weighted);
         total = tape.add(total, sum)?;
     }
     Ok(total)
@@ -258,7 +258,7 @@ fn velocity_factor<T: Real>(
     velocities: Var,
 ) -> Result<Var, AutogradError> {
     let factors = units.velocity_factors(tape, velocities)?;
-    let wanted = truth(tape, batch, VELOCITY_FACTORS)?;
+    let wanted = truth(tape, batch, VELOCITY_FACTORS);
     let difference = tape.sub(factors, wanted)?;
-    sum_of_squares(tape, difference)
+    Ok(sum_of_squares(tape, difference))
 }

@@ -153,7 +153,7 @@ impl Pan2021 {
             frames: transition + 1,
             windows,
         };
-        let keyframe = given.constant(tape, transition, KEYFRAME)?;
+        let keyframe = given.constant(tape, transition, KEYFRAME);
         let target_code = self.target_controller.forward(tape, keyframe)?;
         let root = self
             .root_trajectory_controller
@@ -163,9 +163,9 @@ impl Pan2021 {
             None => None,
         };
         let states = match &self.lstm {
-            Backbone::One(lstm) => vec![lstm.start(tape, windows)?],
+            Backbone::One(lstm) => vec![lstm.start(tape, windows)],
             Backbone::Two(first, second) => {
-                vec![first.start(tape, windows)?, second.start(tape, windows)?]
+                vec![first.start(tape, windows), second.start(tape, windows)]
             }
         };
         let prior = Prior::new(transition);
@@ -204,17 +204,16 @@ struct Rollout<'n, 'f, T> {
 
 impl<T: Real> Rollout<'_, '_, T> {
     /// Feeds the true frame `t`.
-    fn feed_truth(&mut self, tape: &mut Tape<'_, T>, t: usize) -> Result<(), AutogradError> {
+    fn feed_truth(&mut self, tape: &mut Tape<'_, T>, t: usize) {
         let fed = Fed {
-            frame: self.given.constant(tape, t, 0..FRAME)?,
-            root: self.given.constant(tape, t, ROOT_POSITION)?,
-            factors: match self.factors {
-                Some(_) => Some(self.given.constant(tape, t, VELOCITY_FACTORS)?),
-                None => None,
-            },
+            frame: self.given.constant(tape, t, 0..FRAME),
+            root: self.given.constant(tape, t, ROOT_POSITION),
+            factors: self
+                .factors
+                .is_some()
+                .then(|| self.given.constant(tape, t, VELOCITY_FACTORS)),
         };
         self.feed(t, fed);
-        Ok(())
     }
 
     /// Feeds a predicted frame `t`, `[windows, 149]`.
@@ -299,9 +298,9 @@ impl<T: Real> Rollout<'_, '_, T> {
         match network.config.output {
             Output::Absolute => Ok(decoded),
             Output::Residual => {
-                let deviation = self.residual_deviation(tape, t)?;
+                let deviation = self.residual_deviation(tape, t);
                 let scaled = tape.mul(decoded, deviation)?;
-                let mean = self.prior_mean(tape, t)?;
+                let mean = self.prior_mean(tape, t);
                 let frame = tape.add(scaled, mean)?;
                 match self.corrections {
                     Some(corrections) => self.corrected(tape, t, frame, corrections),
@@ -333,8 +332,8 @@ impl<T: Real> Rollout<'_, '_, T> {
         let speeds = self.network.units.speed_changes(tape, changes)?;
         let mut nothing =
             |columns: usize| tape.constant_with(&[windows, columns], |out| out.fill(T::zero()));
-        let between = nothing(VELOCITIES.start - BODY_POSITIONS.end)?;
-        let rest = nothing(FRAME - BODY_VELOCITIES.end)?;
+        let between = nothing(VELOCITIES.start - BODY_POSITIONS.end);
+        let rest = nothing(FRAME - BODY_VELOCITIES.end);
         let correction = tape.concat(&[places, between, speeds, rest])?;
         tape.add(frame, correction)
     }
@@ -358,7 +357,7 @@ impl<T: Real> Rollout<'_, '_, T> {
 
     /// What a residual is multiplied with in frame t + 1, `[149]`: the deviation that the prior
     /// leaves p^b, of p^r and o^r the same; of the velocities that of v^b; 1 for c.
-    fn residual_deviation(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
+    fn residual_deviation(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         tape.constant_with(&[FRAME], |out| {
             out.fill(T::from_f64(self.prior.deviation(t + 1)));
             out[CONTACTS].fill(T::one());
@@ -369,7 +368,7 @@ impl<T: Real> Rollout<'_, '_, T> {
     /// What a residual is added to in frame t + 1, standardised `[windows, 149]`: p^b as
     /// [`Prior`] has it, p^r of the given trajectory, o^r linearly between the keyframes; v^b
     /// and v^r the differences of these p^b and p^r; c 0, their means.
-    fn prior_mean(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
+    fn prior_mean(&self, tape: &mut Tape<'_, T>, t: usize) -> Var {
         let (units, n) = (&self.network.units, self.given.transition);
         let weights = [t, t + 1].map(|t| self.prior.weights(t).map(T::from_f64));
         let share = T::from_f64((t + 1) as f64 / n as f64);
@@ -401,9 +400,9 @@ impl<T: Real> Rollout<'_, '_, T> {
     /// The code of frame t + 1's place: p^r of the given trajectory, and a_t = (t + 1 - k1) / (k2 -
     /// k1) (eq. 2).
     fn position_code(&self, tape: &mut Tape<'_, T>, t: usize) -> Result<Var, AutogradError> {
-        let root = self.given.constant(tape, t + 1, ROOT_POSITION)?;
+        let root = self.given.constant(tape, t + 1, ROOT_POSITION);
         let arrival = T::from_f64((t + 1) as f64 / self.given.transition as f64);
-        let arrival = tape.constant_with(&[self.given.windows, 1], |out| out.fill(arrival))?;
+        let arrival = tape.constant_with(&[self.given.windows, 1], |out| out.fill(arrival));
         let input = tape.concat(&[root, arrival])?;
         self.network.position_encoder.forward(tape, input)
     }
@@ -452,14 +451,14 @@ impl<T: Real> Network<T> for Pan2021 {
         forcing: Forcing,
     ) -> Result<LossTerms, AutogradError> {
         let mut rollout = self.start(tape, &batch.features)?;
-        let first = rollout.given.constant(tape, 0, 0..FRAME)?;
+        let first = rollout.given.constant(tape, 0, 0..FRAME);
         let mut frames = vec![first];
-        rollout.feed_truth(tape, 0)?;
+        rollout.feed_truth(tape, 0);
         for t in 0..rollout.given.transition {
             let frame = rollout.step(tape, t)?;
             frames.push(frame);
             match forcing {
-                Forcing::Teacher => rollout.feed_truth(tape, t + 1)?,
+                Forcing::Teacher => rollout.feed_truth(tape, t + 1),
                 Forcing::FreeRunning => rollout.feed_prediction(tape, t + 1, frame)?,
             }
         }
@@ -482,13 +481,13 @@ impl<T: Real> Network<T> for Pan2021 {
         let mut rollout = self.start(tape, &batch.features)?;
         let (transition, windows) = (rollout.given.transition, rollout.given.windows);
         let mut predicted = Vec::with_capacity(transition * windows * FRAME);
-        rollout.feed_truth(tape, 0)?;
+        rollout.feed_truth(tape, 0);
         let mark = tape.mark();
         for t in 0..transition {
             let frame = rollout.step(tape, t)?;
-            predicted.extend_from_slice(tape.values(frame)?);
+            predicted.extend_from_slice(tape.values(frame));
             rollout.feed_prediction(tape, t + 1, frame)?;
-            tape.forget_since(mark, &mut rollout.keep())?;
+            tape.forget_since(mark, &mut rollout.keep());
         }
         Array3::from_shape_vec((transition, windows, FRAME), predicted).map_err(|_| {
             AutogradError::Argument {

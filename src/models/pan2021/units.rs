@@ -29,8 +29,8 @@ struct Affine {
 impl Affine {
     fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
         let (outputs, inputs) = self.weight.dim();
-        let weight = constant(tape, &[outputs, inputs], &self.weight)?;
-        let bias = constant(tape, &[outputs], &self.bias)?;
+        let weight = constant(tape, &[outputs, inputs], &self.weight);
+        let bias = constant(tape, &[outputs], &self.bias);
         tape.linear(x, weight, Some(bias), false)
     }
 }
@@ -40,7 +40,7 @@ pub(super) fn constant<'v, T: Real>(
     tape: &mut Tape<'_, T>,
     shape: &[usize],
     values: impl IntoIterator<Item = &'v f64>,
-) -> Result<Var, AutogradError> {
+) -> Var {
     tape.constant_with(shape, |out| {
         for (out, &x) in out.iter_mut().zip(values) {
             *out = T::from_f64(x);
@@ -140,7 +140,7 @@ impl Units {
         changes: Var,
     ) -> Result<Var, AutogradError> {
         let scales: Vec<f64> = BODY_POSITIONS.map(|i| self.speed_map(i)[0]).collect();
-        let scales = constant(tape, &[scales.len()], &scales)?;
+        let scales = constant(tape, &[scales.len()], &scales);
         tape.mul(changes, scales)
     }
 
@@ -154,7 +154,7 @@ impl Units {
         let scales: Vec<f64> = BODY_POSITIONS
             .map(|i| self.position_std[i] / self.position_scale)
             .collect();
-        let scales = constant(tape, &[scales.len()], &scales)?;
+        let scales = constant(tape, &[scales.len()], &scales);
         tape.mul(differences, scales)
     }
 
@@ -174,8 +174,8 @@ impl Units {
         standardised: Var,
     ) -> Result<Var, AutogradError> {
         let n = self.velocity_std.len();
-        let std = constant(tape, &[n], &self.velocity_std)?;
-        let mean = constant(tape, &[n], &self.velocity_mean)?;
+        let std = constant(tape, &[n], &self.velocity_std);
+        let mean = constant(tape, &[n], &self.velocity_mean);
         let scaled = tape.mul(standardised, std)?;
         tape.add(scaled, mean)
     }
@@ -186,7 +186,7 @@ impl Units {
         tape: &mut Tape<'_, T>,
         velocities: Var,
     ) -> Result<Var, AutogradError> {
-        let rows = tape.shape(velocities)?[0];
+        let rows = tape.shape(velocities)[0];
         let joints = tape.reshape(velocities, &[rows, JOINTS, 3])?;
         let speeds = tape.vector_norm(joints, NORM_EPS)?;
         self.factors.forward(tape, speeds)
@@ -215,7 +215,7 @@ impl Units {
 }
 
 fn norms<T: Real>(tape: &mut Tape<'_, T>, x: Var, vectors: usize) -> Result<Var, AutogradError> {
-    let rows = tape.shape(x)?[0];
+    let rows = tape.shape(x)[0];
     let x = tape.reshape(x, &[rows, vectors, 3])?;
     tape.vector_norm(x, NORM_EPS)
 }

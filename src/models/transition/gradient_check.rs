@@ -184,11 +184,10 @@ pub fn check_model(
             let mut tape = Tape::inference(parameters, &mut workspace);
             tape.set_dropout(key);
             let losses = network.losses(&mut tape, &batch, case.forcing)?;
-            let total = tape.values(losses.total)?[0];
-            let critics = match losses.critics {
-                Some(critics) => tape.values(critics)?[0],
-                None => 0.0,
-            };
+            let total = tape.values(losses.total)[0];
+            let critics = losses
+                .critics
+                .map_or(0.0, |critics| tape.values(critics)[0]);
             Ok(match name.starts_with(CRITICS) {
                 true => critics,
                 false => total - critics,

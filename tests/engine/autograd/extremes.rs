@@ -21,12 +21,7 @@ fn run<T: Real>(
     let mut tape = Tape::recording(&parameters, &mut workspace);
     let vars: Vec<Var> = inputs.into_iter().map(|input| tape.input(input)).collect();
     let y = build(&mut tape, &vars).unwrap();
-    let output: Vec<f64> = tape
-        .values(y)
-        .unwrap()
-        .iter()
-        .map(|&x| Real::to_f64(x))
-        .collect();
+    let output: Vec<f64> = tape.values(y).iter().map(|&x| Real::to_f64(x)).collect();
     let upstream: Vec<T> = (0..output.len())
         .map(|i| T::from_f64(i as f64 + 1.0))
         .collect();
@@ -39,7 +34,7 @@ fn run<T: Real>(
 
 fn softmax_of<T: Real>(row: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let input = array::<T>(&[1, row.len()], row);
-    let (y, mut gradients) = run(vec![input], |tape, v| tape.softmax(v[0]));
+    let (y, mut gradients) = run(vec![input], |tape, v| Ok(tape.softmax(v[0])));
     (y, gradients.remove(0))
 }
 
@@ -175,11 +170,11 @@ fn saturated_gates_keep_or_forget_the_cell_and_stay_finite() {
 
 fn functions_saturate<T: Real>() {
     let input = || vec![array::<T>(&[4], &[1e30, -1e30, 1e3, -1e3])];
-    let (y, dx) = run(input(), |tape, v| tape.sigmoid(v[0]));
+    let (y, dx) = run(input(), |tape, v| Ok(tape.sigmoid(v[0])));
     assert_eq!((y, dx), (vec![1.0, 0.0, 1.0, 0.0], vec![vec![0.0; 4]]));
-    let (y, dx) = run(input(), |tape, v| tape.tanh(v[0]));
+    let (y, dx) = run(input(), |tape, v| Ok(tape.tanh(v[0])));
     assert_eq!((y, dx), (vec![1.0, -1.0, 1.0, -1.0], vec![vec![0.0; 4]]));
-    let (y, dx) = run(input(), |tape, v| tape.clamp(v[0], 0.0, 1.0));
+    let (y, dx) = run(input(), |tape, v| Ok(tape.clamp(v[0], 0.0, 1.0)));
     assert_eq!((y, dx), (vec![1.0, 0.0, 1.0, 0.0], vec![vec![0.0; 4]]));
 }
 

@@ -63,13 +63,10 @@ fn run<T: Real>(
     tape.set_dropout(dropout.then_some(DROPOUT_KEY));
     let vars: Vec<Var> = match inputs {
         Inputs::Values => values.into_iter().map(|value| tape.input(value)).collect(),
-        Inputs::Parameters => blocks
-            .into_iter()
-            .map(|block| tape.block(block).unwrap())
-            .collect(),
+        Inputs::Parameters => blocks.into_iter().map(|block| tape.block(block)).collect(),
     };
     let y = build(&mut tape, &vars).unwrap();
-    let output = tape.values(y).unwrap().to_vec();
+    let output = tape.values(y).to_vec();
     let upstream: Vec<T> = (0..output.len())
         .map(|i| T::from_f64((i as f64 * 0.7).cos()))
         .collect();
@@ -100,7 +97,7 @@ fn agree<T: Real>(pair: &impl Pair, dropout: bool, tolerance: f64) {
     for inputs in [Inputs::Values, Inputs::Parameters] {
         let fused = run::<T>(&shapes, dropout, inputs, |tape, v| {
             while tape.mark() < masks.get() {
-                tape.constant_with(&[1], |out| out.fill(T::zero())).unwrap();
+                tape.constant_with(&[1], |out| out.fill(T::zero()));
             }
             pair.fused(tape, v)
         });
@@ -150,7 +147,7 @@ impl Pair for Linear {
             y = tape.add(y, v[2])?;
         }
         Ok(if self.relu {
-            tape.clamp(y, 0.0, f64::INFINITY).unwrap()
+            tape.clamp(y, 0.0, f64::INFINITY)
         } else {
             y
         })
@@ -211,12 +208,12 @@ impl Pair for Lstm {
                 gate(tape, 2)?,
                 gate(tape, 3)?,
             ];
-            let (i, f) = (tape.sigmoid(i).unwrap(), tape.sigmoid(f).unwrap());
-            let (g, o) = (tape.tanh(g).unwrap(), tape.sigmoid(o).unwrap());
+            let (i, f) = (tape.sigmoid(i), tape.sigmoid(f));
+            let (g, o) = (tape.tanh(g), tape.sigmoid(o));
             let kept = tape.mul(f, c)?;
             let new = tape.mul(i, g)?;
             let c = tape.add(kept, new)?;
-            let shown = tape.tanh(c).unwrap();
+            let shown = tape.tanh(c);
             let h = tape.mul(o, shown)?;
             state = tape.concat(&[h, c])?;
         }
@@ -263,12 +260,12 @@ impl Attention {
         let k = tape.reshape(k, &[1, tk, dh])?;
         let products = tape.mul(q, k)?;
         let scores = tape.sum_last(products)?;
-        let mut scores = tape.affine(scores, 1.0 / (dh as f64).sqrt(), 0.0).unwrap();
+        let mut scores = tape.affine(scores, 1.0 / (dh as f64).sqrt(), 0.0);
         if let Some(bias) = bias {
             let bias = tape.reshape(bias, &[tq, tk])?;
             scores = tape.add(scores, bias)?;
         }
-        Ok(tape.softmax(scores).unwrap())
+        Ok(tape.softmax(scores))
     }
 }
 
@@ -307,9 +304,7 @@ impl Pair for Attention {
         let (dh, tq, tk, width) = (self.head_width, self.queries, self.keys, self.width());
         // The masks are those of rows padded to whole vectors.
         let padded = tk.next_multiple_of(8);
-        let padding = tape
-            .constant_with(&[tq, padded - tk], |out| out.fill(T::zero()))
-            .unwrap();
+        let padding = tape.constant_with(&[tq, padded - tk], |out| out.fill(T::zero()));
         let (mut all, mut values) = (Vec::new(), Vec::new());
         for window in 0..self.windows {
             let q = tape.rows(v[0], window * tq..(window + 1) * tq)?;
@@ -329,7 +324,7 @@ impl Pair for Attention {
         }
         let all = tape.stack(&all)?;
         masks.set(tape.mark());
-        let all = tape.dropout(all, self.dropout).unwrap();
+        let all = tape.dropout(all, self.dropout);
         let mut windows = Vec::new();
         for window in 0..self.windows {
             let mut heads = Vec::new();
@@ -404,13 +399,11 @@ impl Pair for QueryAttention {
         masks: &Cell<usize>,
     ) -> Result<Var> {
         let width = HEADS * HEAD_WIDTH;
-        let key_bias = tape
-            .constant_with(&[width], |out| {
-                for (k, out) in out.iter_mut().enumerate() {
-                    *out = T::from_f64(k as f64 - 2.0);
-                }
-            })
-            .unwrap();
+        let key_bias = tape.constant_with(&[width], |out| {
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = T::from_f64(k as f64 - 2.0);
+            }
+        });
         let keys = tape.stack(&v[2..4])?;
         let keys = tape.reshape(keys, &[width, 5])?;
         let values = tape.stack(&v[4..6])?;
@@ -459,7 +452,7 @@ impl Pair for AddLayerNorm {
         masks: &Cell<usize>,
     ) -> Result<Var> {
         masks.set(tape.mark());
-        let dropped = tape.dropout(v[0], self.dropout).unwrap();
+        let dropped = tape.dropout(v[0], self.dropout);
         let sum = tape.add(v[1], dropped)?;
         tape.layer_norm(sum, v[2], v[3])
     }
@@ -484,9 +477,7 @@ impl Pair for SumLast {
     }
 
     fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
-        let ones = tape
-            .constant_with(&[19, 1], |out| out.fill(T::one()))
-            .unwrap();
+        let ones = tape.constant_with(&[19, 1], |out| out.fill(T::one()));
         let y = tape.matmul(v[0], ones)?;
         tape.reshape(y, &[4])
     }
@@ -504,10 +495,10 @@ impl Pair for VectorNorm {
     }
 
     fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
-        let squares = tape.square(v[0]).unwrap();
+        let squares = tape.square(v[0]);
         let sums = tape.sum_last(squares)?;
-        let sums = tape.affine(sums, 1.0, 1e-3).unwrap();
-        Ok(tape.sqrt(sums).unwrap())
+        let sums = tape.affine(sums, 1.0, 1e-3);
+        Ok(tape.sqrt(sums))
     }
 }
 
@@ -523,7 +514,7 @@ impl Pair for Prelu {
     }
 
     fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
-        let positive = tape.clamp(v[0], 0.0, f64::INFINITY).unwrap();
+        let positive = tape.clamp(v[0], 0.0, f64::INFINITY);
         let negative = tape.sub(v[0], positive)?;
         let negative = tape.mul(negative, v[1])?;
         tape.add(positive, negative)
