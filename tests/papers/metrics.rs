@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use keydance::evaluation::equations::{Equations, WindowScores, foot_skate, means, window_scores};
-use keydance::evaluation::transitions::TransitionScoring;
+use keydance::evaluation::transitions::{TransitionProtocol as _, TransitionScoring};
 use keydance::evaluation::{EvaluationError, ScoreRow, Scores};
 use keydance::models::ModelError;
 use keydance::models::baselines::interpolation::Interpolation;

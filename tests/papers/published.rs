@@ -3,6 +3,7 @@
 use keydance::evaluation::Protocol as _;
 use keydance::evaluation::equations::Equations;
 use keydance::evaluation::published::{Published, PublishedScores};
+use keydance::evaluation::transitions::TransitionProtocol as _;
 use keydance::models::ModelError;
 use keydance::motion::features::{FACING, FEATURES, FRAME, ROOT_POSITION};
 use ndarray::{Array2, s};

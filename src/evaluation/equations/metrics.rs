@@ -1,13 +1,11 @@
 //! The measurements of one window behind LRP, AVF and ART (section 4.2, eq. 12 to 16).
 
-use std::ops::Range;
-
 use ndarray::{ArrayView2, s};
 
+use crate::evaluation::transitions::{check_window, distance};
 use crate::models::ModelError;
-use crate::models::transition::check_frames;
 use crate::motion::contact::{FOOT_JOINTS, in_contact};
-use crate::motion::features::{BODY_POSITIONS, FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::motion::features::{BODY_POSITIONS, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::placement::world_positions;
 use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
@@ -50,37 +48,20 @@ pub fn window_scores(
     recorded: ArrayView2<f64>,
     predicted: ArrayView2<f64>,
 ) -> Result<WindowScores, ModelError> {
-    let (rows, columns) = recorded.dim();
-    if rows < 2 {
-        return Err(ModelError::NoFrames { rows });
-    }
-    if columns != FEATURES {
-        return Err(ModelError::Shape {
-            what: "recorded window".into(),
-            expected: vec![rows, FEATURES],
-            found: vec![rows, columns],
-        });
-    }
-    let length = rows - 1;
-    check_frames(predicted, length)?;
-
+    check_window(recorded, predicted)?;
     let mut sums = WindowScores::default();
     let mut before_world = world_positions(recorded.row(0));
     let mut before = recorded.row(0);
     for (truth, frame) in recorded.rows().into_iter().skip(1).zip(predicted.rows()) {
-        let distance = |range: Range<usize>| {
-            let squares = range.map(|column| (frame[column] - truth[column]).powi(2));
-            squares.sum::<f64>().sqrt()
-        };
         let factors = velocity_factors_between(before, frame);
         let wanted = truth.slice(s![VELOCITY_FACTORS]);
         let errors = factors
             .iter()
             .zip(wanted)
             .map(|(x, wanted)| (x - wanted).abs());
-        sums.body_position += distance(BODY_POSITIONS);
+        sums.body_position += distance(frame, truth, BODY_POSITIONS);
         sums.velocity_factor += errors.sum::<f64>() / PARTS as f64;
-        sums.root += distance(ROOT_POSITION);
+        sums.root += distance(frame, truth, ROOT_POSITION);
         let world = world_positions(frame);
         for (joint, on) in FOOT_JOINTS.into_iter().zip(in_contact(truth)) {
             if on {
@@ -91,7 +72,7 @@ pub fn window_scores(
         before_world = world;
         before = frame;
     }
-    let frames = length as f64;
+    let frames = predicted.nrows() as f64;
     Ok(WindowScores {
         body_position: sums.body_position / frames,
         velocity_factor: sums.velocity_factor / frames,

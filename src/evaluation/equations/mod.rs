@@ -3,13 +3,12 @@
 
 mod metrics;
 
-use super::protocol::{Evaluation, EvaluationError, Protocol};
-use super::scores::{ScoreRow, Scores};
-use super::transitions::TransitionScoring;
+use ndarray::ArrayView2;
+
+use super::scores::ScoreRow;
+use super::transitions::{Measured, TransitionProtocol, TransitionScoring, row};
 use super::{Better, Metric};
-use crate::data::{DataPart, Dataset};
-use crate::models::Generator;
-use crate::models::transition::DanceClip;
+use crate::models::ModelError;
 
 pub use metrics::{WindowScores, foot_skate, means, window_scores};
 
@@ -55,81 +54,38 @@ const METRICS: [Metric; 4] = [
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Equations(pub TransitionScoring);
 
-/// Frames of a window.
-fn window(length: usize) -> usize {
-    length + 1
-}
+impl TransitionProtocol for Equations {
+    const NAME: &'static str = "equations";
+    const ABOUT: &'static str = "as the paper's equations define them";
+    const METRICS: &'static [Metric] = &METRICS;
 
-impl Protocol for Equations {
-    fn name(&self) -> &'static str {
-        "equations"
+    type Window = WindowScores;
+
+    fn scoring(&self) -> &TransitionScoring {
+        &self.0
     }
 
-    fn about(&self) -> &'static str {
-        "as the paper's equations define them"
+    fn frames_of(length: usize) -> usize {
+        length + 1
     }
 
-    fn metrics(&self) -> &[Metric] {
-        &METRICS
-    }
-
-    fn lengths(&self) -> &[usize] {
-        &self.0.lengths
-    }
-
-    fn frames(&self, recordings: &[usize]) -> u64 {
-        self.0.frames(recordings, window)
-    }
-
-    fn evaluate(
+    fn window_scores(
         &self,
-        subject: &dyn Generator,
-        data: &Dataset,
-        part: DataPart,
-    ) -> Result<Evaluation, EvaluationError> {
-        self.evaluate_clips(subject, &self.0.clips(data, part)?)
-    }
-}
-
-impl Equations {
-    /// Scores a model on all windows of clips that are measured already. The scores are the same to
-    /// the bit on any number of threads.
-    ///
-    /// # Errors
-    ///
-    /// [`EvaluationError`]: a length without windows, or a model that fails or gives frames that do
-    /// not fit.
-    pub fn evaluate_clips(
-        &self,
-        model: &dyn Generator,
-        clips: &[DanceClip],
-    ) -> Result<Evaluation, EvaluationError> {
-        let measured = self.0.measure(model, clips, window, window_scores)?;
-        Ok(Evaluation {
-            scores: self.scores(&measured.lengths),
-            warnings: measured.warnings,
-        })
+        recorded: ArrayView2<f64>,
+        predicted: ArrayView2<f64>,
+    ) -> Result<WindowScores, ModelError> {
+        window_scores(recorded, predicted)
     }
 
-    /// The scores of the windows of each length.
-    fn scores(&self, measured: &[(usize, Vec<WindowScores>)]) -> Scores {
-        let row = |score: &dyn Fn(&[WindowScores]) -> f64| {
-            let scored = measured.iter();
-            ScoreRow::new(scored.map(|(length, windows)| (length, score(windows)))).with_average()
-        };
+    fn rows(&self, measured: &Measured<WindowScores>) -> Vec<(&'static str, ScoreRow)> {
         let (velocity, root) = (self.0.velocity_threshold, self.0.root_threshold);
-        let mut rows: Vec<_> = (0..3)
-            .map(|metric| row(&|windows| means(windows, velocity, root)[metric]))
-            .collect();
+        let mean = |metric: usize| row(measured, |windows| means(windows, velocity, root)[metric]);
+        let mut rows: Vec<ScoreRow> = (0..3).map(mean).collect();
         let skate = |windows: &[WindowScores]| foot_skate(windows).unwrap_or(f64::NAN);
         let mut lengths = measured.iter();
         if lengths.all(|(_, windows)| skate(windows).is_finite()) {
-            rows.push(row(&skate));
+            rows.push(row(measured, skate));
         }
-        let counts = measured.iter();
-        Scores::new(
-            METRICS.iter().map(|metric| metric.key).zip(rows),
-            counts.map(|(length, windows)| (length, windows.len())),
-        )
+        METRICS.iter().map(|metric| metric.key).zip(rows).collect()
     }
 }

@@ -3,14 +3,13 @@
 
 use ndarray::{ArrayView2, s};
 
-use super::protocol::{Evaluation, EvaluationError, Protocol};
-use super::scores::{ScoreRow, Scores};
-use super::transitions::TransitionScoring;
+use super::scores::ScoreRow;
+use super::transitions::{
+    Measured, TransitionProtocol, TransitionScoring, check_window, distance, row,
+};
 use super::{Better, Metric};
-use crate::data::{DataPart, Dataset};
-use crate::models::transition::{DanceClip, check_frames};
-use crate::models::{Generator, ModelError};
-use crate::motion::features::{FACING, FEATURES, POSITIONS, ROOT_POSITION, VELOCITY_FACTORS};
+use crate::models::ModelError;
+use crate::motion::features::{FACING, POSITIONS, ROOT_POSITION, VELOCITY_FACTORS};
 use crate::motion::velocity_factor::{PARTS, velocity_factors_between};
 
 const METRICS: [Metric; 3] = [
@@ -59,106 +58,47 @@ pub struct PublishedScores {
     pub roots_met: f64,
 }
 
-/// Frames of a window.
-fn window(length: usize) -> usize {
-    length
-}
+impl TransitionProtocol for Published {
+    const NAME: &'static str = "published";
+    const ABOUT: &'static str = "as the authors' program counts, which their tables come of";
+    const METRICS: &'static [Metric] = &METRICS;
 
-impl Protocol for Published {
-    fn name(&self) -> &'static str {
-        "published"
+    type Window = PublishedScores;
+
+    fn scoring(&self) -> &TransitionScoring {
+        &self.0
     }
 
-    fn about(&self) -> &'static str {
-        "as the authors' program counts, which their tables come of"
+    fn frames_of(length: usize) -> usize {
+        length
     }
 
-    fn metrics(&self) -> &[Metric] {
-        &METRICS
-    }
-
-    fn lengths(&self) -> &[usize] {
-        &self.0.lengths
-    }
-
-    fn frames(&self, recordings: &[usize]) -> u64 {
-        self.0.frames(recordings, window)
-    }
-
-    fn evaluate(
-        &self,
-        subject: &dyn Generator,
-        data: &Dataset,
-        part: DataPart,
-    ) -> Result<Evaluation, EvaluationError> {
-        self.evaluate_clips(subject, &self.0.clips(data, part)?)
-    }
-}
-
-impl Published {
-    /// Scores a model on all windows of clips that are measured already.
-    ///
-    /// # Errors
-    ///
-    /// [`EvaluationError`]: a length without windows, or a model that fails or gives frames that do
-    /// not fit.
-    pub fn evaluate_clips(
-        &self,
-        model: &dyn Generator,
-        clips: &[DanceClip],
-    ) -> Result<Evaluation, EvaluationError> {
-        let score = |recorded: ArrayView2<f64>, predicted: ArrayView2<f64>| {
-            self.window_scores(recorded, predicted)
-        };
-        let measured = self.0.measure(model, clips, window, score)?;
-        let row = |of: fn(&PublishedScores) -> f64| {
-            let mean = |windows: &[PublishedScores]| {
-                windows.iter().map(of).sum::<f64>() / windows.len() as f64
-            };
-            let lengths = measured.lengths.iter();
-            ScoreRow::new(lengths.map(|(length, windows)| (length, mean(windows)))).with_average()
-        };
-        let rows = [
-            row(|scores| scores.position),
-            row(|scores| scores.velocity_factors_met),
-            row(|scores| scores.roots_met),
+    fn rows(&self, measured: &Measured<PublishedScores>) -> Vec<(&'static str, ScoreRow)> {
+        let of: [fn(&PublishedScores) -> f64; 3] = [
+            |scores| scores.position,
+            |scores| scores.velocity_factors_met,
+            |scores| scores.roots_met,
         ];
-        let counts = measured.lengths.iter();
-        Ok(Evaluation {
-            scores: Scores::new(
-                METRICS.iter().map(|metric| metric.key).zip(rows),
-                counts.map(|(length, windows)| (length, windows.len())),
-            ),
-            warnings: measured.warnings,
-        })
+        let mean = |of: fn(&PublishedScores) -> f64| {
+            row(measured, |windows| {
+                windows.iter().map(of).sum::<f64>() / windows.len() as f64
+            })
+        };
+        METRICS
+            .iter()
+            .map(|metric| metric.key)
+            .zip(of.map(mean))
+            .collect()
     }
 
-    /// Measures a prediction against the recorded window.
-    ///
-    /// `recorded`: `[N, 154]`, frames k1 to k2, not standardised. `predicted`: `[N - 1, 149]`,
-    /// frames k1 + 1 to k2; of the last one the true positions, root and facing are taken.
-    ///
-    /// # Errors
-    ///
-    /// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two
-    /// do not fit together.
-    pub fn window_scores(
+    /// Of the last predicted frame the true positions, root and facing are taken.
+    fn window_scores(
         &self,
         recorded: ArrayView2<f64>,
         predicted: ArrayView2<f64>,
     ) -> Result<PublishedScores, ModelError> {
-        let (rows, columns) = recorded.dim();
-        if rows < 2 {
-            return Err(ModelError::NoFrames { rows });
-        }
-        if columns != FEATURES {
-            return Err(ModelError::Shape {
-                what: "recorded window".into(),
-                expected: vec![rows, FEATURES],
-                found: vec![rows, columns],
-            });
-        }
-        check_frames(predicted, rows - 1)?;
+        check_window(recorded, predicted)?;
+        let rows = recorded.nrows();
         let mut shown = predicted.to_owned();
         let known = POSITIONS.start..FACING.end;
         let end = recorded.slice(s![rows - 1, known.clone()]);
@@ -167,12 +107,8 @@ impl Published {
         let (mut position, mut factors_met, mut roots_met) = (0.0, PARTS, 1);
         let mut before = recorded.row(0);
         for (truth, frame) in recorded.rows().into_iter().skip(1).zip(shown.rows()) {
-            let distance = |range: std::ops::Range<usize>| {
-                let squares = range.map(|column| (frame[column] - truth[column]).powi(2));
-                squares.sum::<f64>().sqrt()
-            };
-            position += distance(POSITIONS);
-            roots_met += usize::from(distance(ROOT_POSITION) < self.0.root_threshold);
+            position += distance(frame, truth, POSITIONS);
+            roots_met += usize::from(distance(frame, truth, ROOT_POSITION) < self.0.root_threshold);
             let factors = velocity_factors_between(before, frame);
             let wanted = truth.slice(s![VELOCITY_FACTORS]);
             let met = |(x, wanted): (&f64, &f64)| (x - wanted).abs() < self.0.velocity_threshold;

@@ -1,17 +1,22 @@
 //! What the protocols of transitions share: windows of recorded clips, a model's raw output for
-//! each, and means over the windows of a length.
+//! each, and scores of the windows of a length. They differ in how they count.
 
 mod window_request;
 
-use ndarray::{Array2, ArrayView2};
+use std::ops::Range;
+
+use ndarray::{Array2, ArrayView1, ArrayView2};
 use rayon::prelude::*;
 
-use super::protocol::{EvaluationError, EvaluationOptions};
+use super::Metric;
+use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
+use super::scores::{ScoreRow, Scores};
 use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
-use crate::models::transition::{DanceClip, Window, window_features, windows};
+use crate::models::transition::{DanceClip, Window, check_frames, window_features, windows};
 use crate::models::{Generator, ModelError};
 use crate::motion::FeatureConfig;
+use crate::motion::features::FEATURES;
 
 pub use window_request::window_request;
 
@@ -46,11 +51,132 @@ impl Default for TransitionScoring {
     }
 }
 
-/// What was measured of the windows of each length N.
-pub struct Measured<S> {
-    pub lengths: Vec<(usize, Vec<S>)>,
-    /// Clips that are shorter than a window.
-    pub warnings: Vec<String>,
+/// What was measured of the windows of each length N, `[lengths][windows]`.
+pub type Measured<S> = Vec<(usize, Vec<S>)>;
+
+/// How a protocol of transitions counts; it is a [`Protocol`] through that.
+pub trait TransitionProtocol: Send + Sync {
+    /// [`Protocol::name`].
+    const NAME: &'static str;
+    /// [`Protocol::about`].
+    const ABOUT: &'static str;
+    /// [`Protocol::metrics`].
+    const METRICS: &'static [Metric];
+
+    /// What is measured of one window.
+    type Window: Send;
+
+    fn scoring(&self) -> &TransitionScoring;
+
+    /// Frames of the window of a length N. Windows start every ceil(0.1 of them) frames of a clip.
+    fn frames_of(length: usize) -> usize;
+
+    /// Measures a prediction against the recorded window.
+    ///
+    /// `recorded`: `[window, 154]`, frames k1 to k2; `predicted`: `[window - 1, 149]`, frames k1 + 1
+    /// to k2; neither is standardised.
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two
+    /// do not fit together.
+    fn window_scores(
+        &self,
+        recorded: ArrayView2<f64>,
+        predicted: ArrayView2<f64>,
+    ) -> Result<Self::Window, ModelError>;
+
+    /// The scores by the metrics' keys; a metric that cannot be told is left out.
+    fn rows(&self, measured: &Measured<Self::Window>) -> Vec<(&'static str, ScoreRow)>;
+
+    /// Scores a model on all windows of clips that are measured already. The scores are the same to
+    /// the bit on any number of threads.
+    ///
+    /// # Errors
+    /// A length without windows, or a model that fails or gives frames that do not fit.
+    fn evaluate_clips(
+        &self,
+        model: &dyn Generator,
+        clips: &[DanceClip],
+    ) -> Result<Evaluation, EvaluationError>
+    where
+        Self: Sized,
+    {
+        let (measured, warnings) = measure(self, model, clips)?;
+        let counts = measured.iter();
+        let counts = counts.map(|(length, windows)| (length, windows.len()));
+        Ok(Evaluation {
+            scores: Scores::new(self.rows(&measured), counts),
+            warnings,
+        })
+    }
+}
+
+impl<P: TransitionProtocol> Protocol for P {
+    fn name(&self) -> &'static str {
+        P::NAME
+    }
+
+    fn about(&self) -> &'static str {
+        P::ABOUT
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        P::METRICS
+    }
+
+    fn lengths(&self) -> &[usize] {
+        &self.scoring().lengths
+    }
+
+    fn frames(&self, recordings: &[usize]) -> u64 {
+        let scoring = self.scoring();
+        let of_length = |&length: &usize| match P::frames_of(length) {
+            0 | 1 => 0,
+            frames => (scoring.cut(recordings, frames).0.len() * frames) as u64,
+        };
+        scoring.lengths.iter().map(of_length).sum()
+    }
+
+    fn evaluate(
+        &self,
+        subject: &dyn Generator,
+        data: &Dataset,
+        part: DataPart,
+    ) -> Result<Evaluation, EvaluationError> {
+        let clips = DanceClip::measure_all(part.of(data)?, &self.scoring().features);
+        self.evaluate_clips(subject, &clips.map_err(|error| bad(error.to_string()))?)
+    }
+}
+
+/// A score of each length, and their mean.
+pub(super) fn row<S>(measured: &Measured<S>, score: impl Fn(&[S]) -> f64) -> ScoreRow {
+    let lengths = measured.iter();
+    ScoreRow::new(lengths.map(|(length, windows)| (length, score(windows)))).with_average()
+}
+
+/// Refuses a recorded window and a prediction that do not fit together, or that hold no numbers.
+pub(super) fn check_window(
+    recorded: ArrayView2<f64>,
+    predicted: ArrayView2<f64>,
+) -> Result<(), ModelError> {
+    let (rows, columns) = recorded.dim();
+    if rows < 2 {
+        return Err(ModelError::NoFrames { rows });
+    }
+    if columns != FEATURES {
+        return Err(ModelError::Shape {
+            what: "recorded window".into(),
+            expected: vec![rows, FEATURES],
+            found: vec![rows, columns],
+        });
+    }
+    check_frames(predicted, rows - 1)
+}
+
+/// How far apart two frames are in these numbers, L2.
+pub(super) fn distance(a: ArrayView1<f64>, b: ArrayView1<f64>, numbers: Range<usize>) -> f64 {
+    let squares = numbers.map(|number| (a[number] - b[number]).powi(2));
+    squares.sum::<f64>().sqrt()
 }
 
 impl TransitionScoring {
@@ -68,91 +194,62 @@ impl TransitionScoring {
         }
     }
 
-    /// The clips of a part of the data, measured.
-    pub(super) fn clips(
-        &self,
-        data: &Dataset,
-        part: DataPart,
-    ) -> Result<Vec<DanceClip>, EvaluationError> {
-        DanceClip::measure_all(part.of(data)?, &self.features)
-            .map_err(|error| bad(error.to_string()))
-    }
-
-    /// Frames of all windows of recordings of these numbers of frames.
-    pub(super) fn frames(&self, recordings: &[usize], window: fn(usize) -> usize) -> u64 {
-        let of_length = |&length: &usize| match window(length).checked_sub(1) {
-            None | Some(0) => 0,
-            Some(span) => (self.cut(recordings, span).0.len() * (span + 1)) as u64,
-        };
-        self.lengths.iter().map(of_length).sum()
-    }
-
-    /// Asks a model about all windows and measures each answer.
-    ///
-    /// `window`: frames of the window of a length N; windows start every ceil(0.1 window) frames of
-    /// each clip. `measure` is given the recorded window, `[window, 154]`, and the predicted frames
-    /// after its first, `[window - 1, 149]`, neither standardised.
-    ///
-    /// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the
-    /// number of threads and their results are kept in order.
-    ///
-    /// # Errors
-    /// A length without windows, or a model that fails or gives frames that do not fit.
-    pub(super) fn measure<S: Send>(
-        &self,
-        model: &dyn Generator,
-        clips: &[DanceClip],
-        window: fn(usize) -> usize,
-        measure: impl Fn(ArrayView2<f64>, ArrayView2<f64>) -> Result<S, ModelError> + Sync,
-    ) -> Result<Measured<S>, EvaluationError> {
-        let clip_frames: Vec<usize> = clips.iter().map(DanceClip::frames).collect();
-        let (mut measured, mut warnings) = (Vec::new(), Vec::new());
-        for &length in &self.lengths {
-            let needed = window(length);
-            let Some(span) = needed.checked_sub(1).filter(|&span| span > 0) else {
-                let least = length + 2 - needed;
-                return Err(bad(format!(
-                    "a window of length {length} has no frame to predict; give lengths of {least} \
-                     or more"
-                )));
-            };
-            let (cut, skipped) = self.cut(&clip_frames, span);
-            if cut.is_empty() {
-                return Err(EvaluationError::NoWindows {
-                    length,
-                    needed,
-                    clips: clips.len(),
-                    longest: clip_frames.iter().copied().max().unwrap_or(0),
-                });
-            }
-            warnings.extend(skipped.into_iter().map(|clip| {
-                format!(
-                    "{} has {}, fewer than a window of {needed} (N = {length}): left out of the \
-                     scores at this length",
-                    clips[clip].name,
-                    counted(clip_frames[clip], "frame"),
-                )
-            }));
-            let chunks = cut.par_chunks(self.chunk.max(1));
-            let of_chunk = |chunk: &[Window]| measure_chunk(model, clips, chunk, span, &measure);
-            let scores: Vec<Vec<S>> = chunks.map(of_chunk).collect::<Result<_, _>>()?;
-            measured.push((length, scores.into_iter().flatten().collect()));
-        }
-        Ok(Measured {
-            lengths: measured,
-            warnings,
-        })
-    }
-
-    /// Windows of `span + 1` frames, and the clips that are shorter.
-    fn cut(&self, clip_frames: &[usize], span: usize) -> (Vec<Window>, Vec<usize>) {
-        let cut = windows(clip_frames, span);
+    /// Windows of so many frames, and the clips that are shorter.
+    fn cut(&self, clip_frames: &[usize], frames: usize) -> (Vec<Window>, Vec<usize>) {
+        let cut = windows(clip_frames, frames - 1);
         let windows = match self.most_windows {
             Some(most) => spread(&cut.windows, most),
             None => cut.windows,
         };
         (windows, cut.skipped)
     }
+}
+
+/// Asks a model about all windows and measures each answer. With them, warnings of clips that are
+/// shorter than a window.
+///
+/// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the
+/// number of threads and their results are kept in order.
+fn measure<P: TransitionProtocol>(
+    protocol: &P,
+    model: &dyn Generator,
+    clips: &[DanceClip],
+) -> Result<(Measured<P::Window>, Vec<String>), EvaluationError> {
+    let scoring = protocol.scoring();
+    let clip_frames: Vec<usize> = clips.iter().map(DanceClip::frames).collect();
+    let (mut measured, mut warnings) = (Vec::new(), Vec::new());
+    for &length in &scoring.lengths {
+        let needed = P::frames_of(length);
+        if needed < 2 {
+            let least = length + 2 - needed;
+            return Err(bad(format!(
+                "a window of length {length} has no frame to predict; give lengths of {least} or \
+                 more"
+            )));
+        }
+        let (cut, skipped) = scoring.cut(&clip_frames, needed);
+        if cut.is_empty() {
+            return Err(EvaluationError::NoWindows {
+                length,
+                needed,
+                clips: clips.len(),
+                longest: clip_frames.iter().copied().max().unwrap_or(0),
+            });
+        }
+        warnings.extend(skipped.into_iter().map(|clip| {
+            format!(
+                "{} has {}, fewer than a window of {needed} (N = {length}): left out of the scores \
+                 at this length",
+                clips[clip].name,
+                counted(clip_frames[clip], "frame"),
+            )
+        }));
+        let chunks = cut.par_chunks(scoring.chunk.max(1));
+        let of_chunk = |chunk: &[Window]| measure_chunk(protocol, model, clips, chunk, needed);
+        let scores: Vec<Vec<P::Window>> = chunks.map(of_chunk).collect::<Result<_, _>>()?;
+        measured.push((length, scores.into_iter().flatten().collect()));
+    }
+    Ok((measured, warnings))
 }
 
 fn bad(reason: String) -> EvaluationError {
@@ -167,14 +264,15 @@ fn spread(windows: &[Window], most: usize) -> Vec<Window> {
         .collect()
 }
 
-/// Predicts and measures a chunk of windows of `span + 1` frames.
-fn measure_chunk<S>(
+/// Predicts and measures a chunk of windows of so many frames.
+fn measure_chunk<P: TransitionProtocol>(
+    protocol: &P,
     model: &dyn Generator,
     clips: &[DanceClip],
     chunk: &[Window],
-    span: usize,
-    measure: &impl Fn(ArrayView2<f64>, ArrayView2<f64>) -> Result<S, ModelError>,
-) -> Result<Vec<S>, EvaluationError> {
+    frames: usize,
+) -> Result<Vec<P::Window>, EvaluationError> {
+    let span = frames - 1;
     let features = |it: &Window| window_features(&clips[it.clip].features, it.start, span);
     let recorded: Vec<_> = chunk.iter().map(features).collect();
     let windows = || chunk.iter().zip(&recorded);
@@ -196,7 +294,7 @@ fn measure_chunk<S>(
     };
     let predicted: Vec<Array2<f64>> = model.raw(&requests).map_err(|source| {
         let Window { clip, start, .. } = chunk[0];
-        let (clip, frames) = (&clips[clip].name, span + 1);
+        let clip = &clips[clip].name;
         let what =
             format!("a chunk of windows of {frames} frames that starts with {clip}, frame {start}");
         failed(what, source)
@@ -210,7 +308,8 @@ fn measure_chunk<S>(
     windows()
         .zip(&predicted)
         .map(|((window, recorded), predicted)| {
-            measure(recorded.view(), predicted.view()).map_err(|source| {
+            let scores = protocol.window_scores(recorded.view(), predicted.view());
+            scores.map_err(|source| {
                 let (clip, start) = (&clips[window.clip].name, window.start);
                 let end = start + span;
                 failed(format!("{clip}, frames {start} to {end}"), source)
