@@ -87,7 +87,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     };
     let manifest = run.manifest()?.context("the training left no manifest")?;
     let rows = comparison.rows(config, &manifest);
-    let (protocols, printed) = (protocols, &config.printed()?);
+    let printed = &config.printed()?;
     let tables = Tables { protocols, printed };
     write!(out, "\n{}\n", tables.terminal(&rows))?;
     demo::write_scores(run.path(), &settings, &dataset, &comparison, tables, &rows)?;

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::clip_choice::ClipChoice;
-use super::list::within;
+use super::list::{name, within};
 use super::notice::warn;
 use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
@@ -42,10 +42,11 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     windows: Option<u32>,
     /// Ways of counting to score by, such as published, instead of all that the model's paper has
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
     protocol: Vec<String>,
     /// Write the scores here, too; a run's folder gets those of its own model by all protocols, on
-    /// all windows of the paper's lengths anyway, as evaluation.json (evaluation_validation.json, evaluation_train.json)
+    /// all windows of the paper's lengths anyway, as evaluation.json (evaluation_validation.json,
+    /// evaluation_train.json)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// For a config: a folder for config and scores, which `keydance tables` reads like a run's

@@ -36,8 +36,11 @@ pub fn evaluate_watched(
         let (done, meter) = &mut *shown;
         *done += frames;
         let (_, left) = meter.speed(*done);
-        let (name, share) = (model.name(), meter.share(*done));
-        meter.show(*done, &format!("evaluating {name}  {share}  {left} left"));
+        let (name, by, share) = (model.name(), protocol.name(), meter.share(*done));
+        meter.show(
+            *done,
+            &format!("evaluating {name} by {by}  {share}  {left} left"),
+        );
     };
     let watched = Watched {
         model,

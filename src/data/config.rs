@@ -18,8 +18,8 @@ pub struct DataConfig {
     pub split: Split,
     /// Share of the training clips that is kept aside for validation, at least 0 and below 1.
     pub validation_share: f64,
-    /// For clips on another skeleton than the dance skeleton: what a mapping file says. A config may
-    /// give the file's path, relative to itself; a run holds the content.
+    /// For clips on another skeleton than the dance skeleton: what a mapping file says. A config
+    /// may give the file's path, relative to itself; a run holds the content.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mapping: Option<Mapping>,
     /// Unit of the files' lengths: "cm", "m", "mm", "in"; "auto" recognises it by the body's

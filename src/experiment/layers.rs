@@ -321,12 +321,10 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
         let origin = layer.map_or("the defaults", |(origin, _)| origin);
         ConfigError::Refused(format!("{origin}: {cause}"))
     })?;
+    let files = layers.iter().flat_map(|layer| layer.files.clone());
+    config.files = files.collect();
     // A budget is over any model; what it says of a part that this one lacks makes no other
     // experiment of it.
-    config.files = layers
-        .iter()
-        .flat_map(|layer| layer.files.clone())
-        .collect();
     let groups = config.model.rate_groups();
     let rates = &mut config.optimiser.rates;
     rates.retain(|group, _| groups.contains(&group.as_str()));

@@ -46,14 +46,14 @@ pub fn facing_angles(world: &[Vec<DVec3>], joints: &FacingJoints, sigma: f64) ->
 /// Facing angles of predicted frames between two keyframes whose own facing angles are known,
 /// `[N + 1]`, rad.
 ///
-/// `world` holds the world positions of keyframe k1 and of the N frames after it, `[N + 1][joints]`,
-/// cm; `start` and `target` are the facing angles of k1 and k2. [`facing_angles`] smooths over the
-/// frames before k1 and after k2 too; here those are not there, and the dancer is taken to face
-/// along `start` before k1 and along `target` after k2. What the smoothed angles of k1 and k2 then
-/// still differ from the known ones is taken off, at the keyframe whole and less from frame to
-/// frame, until nothing is left `sigma` frames (or N, where that is less) away. So the first angle
-/// is `start`, the last is `target` up to full turns, and in between the angles follow the frames'
-/// own bodies.
+/// `world` holds the world positions of keyframe k1 and of the N frames after it, cm, an array of
+/// `[N + 1][joints]`; `start` and `target` are the facing angles of k1 and k2. [`facing_angles`]
+/// smooths over the frames before k1 and after k2 too; here those are not there, and the dancer is
+/// taken to face along `start` before k1 and along `target` after k2. What the smoothed angles of
+/// k1 and k2 then still differ from the known ones is taken off, at the keyframe whole and less
+/// from frame to frame, until nothing is left `sigma` frames (or N, where that is less) away. So
+/// the first angle is `start`, the last is `target` up to full turns, and in between the angles
+/// follow the frames' own bodies.
 pub fn facing_angles_between(
     world: &[Vec<DVec3>],
     joints: &FacingJoints,

@@ -59,8 +59,8 @@ pub(super) fn metric_axis(metric: &Metric) -> String {
     format!("{} ({}), {better}", metric.title, metric.unit)
 }
 
-/// The figure of the rows' scores by a protocol on test clips, SVG: the mean over a model's seeds, and of the
-/// rows that the paper's file names the printed ones.
+/// The figure of the rows' scores by a protocol on test clips, SVG: the mean over a model's seeds,
+/// and of the rows that the paper's file names the printed ones.
 ///
 /// None where no column is a number that scores could be drawn over.
 ///

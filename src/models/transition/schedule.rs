@@ -44,9 +44,9 @@ pub struct Schedule {
 impl Schedule {
     /// Counts the schedule for training clips of these numbers of frames.
     ///
-    /// With a `fraction` below 1, or `frame_steps` in its place, whole batches are dealt: the windows due of a length that fill
-    /// none go to the next length, so that a small share has steps of `batch_size` windows as any
-    /// other, and the total is right to one batch.
+    /// With a `fraction` below 1, or `frame_steps` in its place, whole batches are dealt: the
+    /// windows due of a length that fill none go to the next length, so that a small share has
+    /// steps of `batch_size` windows as any other, and the total is right to one batch.
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
         let mut schedule = Self {
             clip_frames: clip_frames.to_vec(),
