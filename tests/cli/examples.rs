@@ -10,7 +10,15 @@ use crate::generated_data::write_clips;
 
 fn example(name: &str) -> Command {
     let binary = assert_cmd::cargo::cargo_bin("keydance");
-    Command::new(binary.with_file_name("examples").join(name))
+    let example = binary.with_file_name("examples").join(name);
+    let found = example
+        .with_extension(std::env::consts::EXE_EXTENSION)
+        .exists();
+    assert!(
+        found,
+        "{name} is not built: `cargo test` builds it, or `cargo build --examples`"
+    );
+    Command::new(example)
 }
 
 #[test]
