@@ -1,7 +1,8 @@
 //! Folders as a whole.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Copies a folder with everything in it.
 pub fn copy(from: &Path, to: &Path) {
@@ -14,4 +15,22 @@ pub fn copy(from: &Path, to: &Path) {
             fs::copy(entry.path(), to).unwrap();
         }
     }
+}
+
+/// Every file below a folder with its content, and every link with where it leads.
+pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let (path, kind) = (entry.path(), entry.file_type().unwrap());
+        if kind.is_dir() {
+            found.extend(files(&path));
+        } else if kind.is_symlink() {
+            let leads = fs::read_link(&path).unwrap();
+            found.insert(path, leads.into_os_string().into_encoded_bytes());
+        } else {
+            let content = fs::read(&path).unwrap();
+            found.insert(path, content);
+        }
+    }
+    found
 }

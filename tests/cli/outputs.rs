@@ -2,7 +2,6 @@
 //! whole or not at all.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -11,7 +10,7 @@ use std::sync::LazyLock;
 
 use tempfile::TempDir;
 
-use crate::folders::copy;
+use crate::folders::{copy, files};
 use crate::trained_run::{TrainedRun, keydance};
 
 static FIXTURE: LazyLock<TrainedRun> = LazyLock::new(TrainedRun::new);
@@ -41,20 +40,6 @@ fn run(place: &Path, words: &[&str]) -> Output {
     let mut command = keydance(words[0]);
     command.args(&words[1..]).current_dir(place);
     command.output().unwrap()
-}
-
-/// Every file below a folder, links not followed, with its content.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
-        if entry.file_type().unwrap().is_dir() {
-            found.extend(files(&entry.path()));
-        } else {
-            let content = fs::read(entry.path()).unwrap_or_default();
-            found.insert(entry.path(), content);
-        }
-    }
-    found
 }
 
 /// The command is refused with these words, and nothing is written.

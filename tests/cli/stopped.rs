@@ -2,7 +2,6 @@
 //! end is the same to the bit.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
@@ -20,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::folders::copy;
+use crate::folders::{copy, files};
 use crate::generated_data::write_clips;
 use crate::small_run::{SmallRun, digest, keydance, stderr};
 
@@ -71,19 +70,6 @@ fn listed(folder: &Path) -> String {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().skip(1).collect::<Vec<_>>().join("\n")
-}
-
-/// Every file below a folder with its content.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
-        if entry.file_type().unwrap().is_dir() {
-            found.extend(files(&entry.path()));
-        } else {
-            found.insert(entry.path(), fs::read(entry.path()).unwrap());
-        }
-    }
-    found
 }
 
 /// A long training that was stopped by Ctrl-C after its first steps, with what it said.

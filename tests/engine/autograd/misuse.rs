@@ -30,10 +30,23 @@ impl Numbers {
         let start = self.sizes[start];
         HeadColumns { value, start }
     }
+
+    fn heads(&self, v: &[Var]) -> [HeadColumns; 3] {
+        [self.head(v[0], 4), self.head(v[1], 5), self.head(v[2], 5)]
+    }
+
+    fn attention(&self) -> AttentionShape {
+        AttentionShape {
+            heads: self.sizes[0],
+            width: self.sizes[1],
+            queries: self.sizes[2],
+            keys: self.sizes[3],
+        }
+    }
 }
 
 /// Every operation, on whatever operands and numbers.
-const OPERATIONS: [(&str, Operation); 35] = [
+const OPERATIONS: [(&str, Operation); 42] = [
     ("abs", |t, v, _| Ok(t.abs(v[0]))),
     ("add", |t, v, _| t.add(v[0], v[1])),
     ("add_layer_norm", |t, v, n| {
@@ -41,29 +54,16 @@ const OPERATIONS: [(&str, Operation); 35] = [
     }),
     ("affine", |t, v, n| Ok(t.affine(v[0], n.real, 1.0))),
     ("attention", |t, v, n| {
-        let shape = AttentionShape {
-            heads: n.sizes[0],
-            width: n.sizes[1],
-            queries: n.sizes[2],
-            keys: n.sizes[3],
-        };
-        let operands = [n.head(v[0], 4), n.head(v[1], 5), n.head(v[2], 5)];
-        t.attention(operands, shape, None, n.real)
+        t.attention(n.heads(v), n.attention(), None, n.real)
     }),
     ("biased attention", |t, v, n| {
-        let shape = AttentionShape {
-            heads: n.sizes[0],
-            width: n.sizes[1],
-            queries: n.sizes[2],
-            keys: n.sizes[3],
-        };
-        let operands = [n.head(v[0], 4), n.head(v[1], 5), n.head(v[2], 5)];
-        t.attention(operands, shape, Some(v[3]), n.real)
+        t.attention(n.heads(v), n.attention(), Some(v[3]), n.real)
     }),
     ("clamp", |t, v, n| Ok(t.clamp(v[0], n.real, 1.0))),
     ("columns", |t, v, n| t.columns(v[0], n.sizes[0]..n.sizes[1])),
     ("concat", |t, v, n| t.concat(&v[..n.sizes[0].min(3)])),
     ("detach", |t, v, _| Ok(t.detach(v[0]))),
+    ("div", |t, v, _| t.div(v[0], v[1])),
     ("dropout", |t, v, n| Ok(t.dropout(v[0], n.real))),
     ("exp", |t, v, _| Ok(t.exp(v[0]))),
     ("forward_kinematics", |t, v, n| {
@@ -75,6 +75,7 @@ const OPERATIONS: [(&str, Operation); 35] = [
     ("linear without a bias", |t, v, _| {
         t.linear(v[0], v[1], None, false)
     }),
+    ("ln", |t, v, _| Ok(t.ln(v[0]))),
     ("lstm_cell", |t, v, _| {
         let weights = LstmWeights {
             weight_ih: v[2],
@@ -85,6 +86,10 @@ const OPERATIONS: [(&str, Operation); 35] = [
         t.lstm_cell(v[0], v[1], weights)
     }),
     ("matmul", |t, v, _| t.matmul(v[0], v[1])),
+    ("mean", |t, v, _| t.mean(v[0])),
+    ("mean_squared_error", |t, v, _| {
+        t.mean_squared_error(v[0], v[1])
+    }),
     ("mul", |t, v, _| t.mul(v[0], v[1])),
     ("noise", |t, v, n| Ok(t.noise(v[0], n.real))),
     ("normalise", |t, v, n| t.normalise(v[0], n.sizes[0], n.real)),
@@ -105,13 +110,16 @@ const OPERATIONS: [(&str, Operation); 35] = [
     }),
     ("sigmoid", |t, v, _| Ok(t.sigmoid(v[0]))),
     ("softmax", |t, v, _| Ok(t.softmax(v[0]))),
+    ("sqrt", |t, v, _| Ok(t.sqrt(v[0]))),
     ("square", |t, v, _| Ok(t.square(v[0]))),
     ("stack", |t, v, n| t.stack(&v[..n.sizes[0].min(3)])),
     ("strided_rows", |t, v, n| {
         t.strided_rows(v[0], n.sizes[0], n.sizes[1])
     }),
+    ("sub", |t, v, _| t.sub(v[0], v[1])),
     ("sum", |t, v, _| Ok(t.sum(v[0]))),
     ("sum_last", |t, v, _| t.sum_last(v[0])),
+    ("tanh", |t, v, _| Ok(t.tanh(v[0]))),
     ("vector_norm", |t, v, n| t.vector_norm(v[0], n.real)),
 ];
 
