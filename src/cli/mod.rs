@@ -58,7 +58,7 @@ enum Command {
     /// Train a model
     #[command(after_help = include_str!("help/train.txt"))]
     Train(train::TrainArgs),
-    /// Score a trained model, or interpolation, by the paper's protocol: LRP, AVF, ART
+    /// Score a trained model, or interpolation, by its paper's protocols: LRP, AVF, ART
     #[command(after_help = include_str!("help/evaluate.txt"))]
     Evaluate(evaluate::EvaluateArgs),
     #[command(after_help = include_str!("help/generate.txt"))]

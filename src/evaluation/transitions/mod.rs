@@ -221,10 +221,10 @@ fn measure<P: TransitionProtocol>(
     for &length in &scoring.lengths {
         let needed = P::frames_of(length);
         if needed < 2 {
-            let least = length + 2 - needed;
+            let (least, name) = (length + 2 - needed, P::NAME);
             return Err(bad(format!(
-                "a window of length {length} has no frame to predict; give lengths of {least} or \
-                 more"
+                "a window of length {length} has no frame to predict by {name}; give lengths of \
+                 {least} or more"
             )));
         }
         let (cut, skipped) = scoring.cut(&clip_frames, needed);
