@@ -93,7 +93,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
         lengths: lengths.into_iter().collect(),
         most_windows: args.windows.map(|most| most as usize),
     };
-    let protocols = config.model.protocols(&config.data, &options);
+    let protocols = config.protocols_with(&options);
     let protocols = choose(protocols, &args.protocol, !args.lengths.is_empty())?;
     let farewell = format!(
         "stopped, nothing is written; begin again with\n  {}",

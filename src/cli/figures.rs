@@ -11,7 +11,6 @@ use super::notice::warn;
 use super::threads::Threads;
 use crate::counted::counted;
 use crate::data::Dataset;
-use crate::models::registry;
 use crate::report::figures::FigureRequest;
 use crate::run::{Subject, check_output_folder, check_outputs, replace_file};
 
@@ -73,8 +72,8 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let inputs: Vec<PathBuf> = models.flat_map(Subject::files).collect();
     check_outputs(&args.viewer, inputs.iter().chain([&args.data]), args.force)?;
     check_output_folder(&args.out, args.force)?;
-    let kind = registry::find(subject.config.model.kind());
-    let paper = kind.context("the model is not in the registry")?.paper();
+    let paper = subject.config.paper();
+    let paper = paper.context("the model is not in the registry")?;
     let draw = paper
         .figures
         .with_context(|| format!("{} has no figures that could be drawn", paper.name))?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::data::DataConfig;
 use crate::evaluation::{EvaluationOptions, PrintedError, PrintedTables, Protocol};
 use crate::models::registry;
-use crate::models::settings::{ModelSettings, ValueError};
+use crate::models::settings::{ModelSettings, Paper, ValueError};
 use crate::optim::AdamConfig;
 
 /// Longest window that a config may name, frames.
@@ -21,6 +21,9 @@ const MOST_WINDOWS: usize = 65_536;
 pub struct ExperimentConfig {
     /// Name of the experiment in tables and manifests.
     pub name: String,
+    /// The paper whose protocols, tables and figures it stands in; left out: the model's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paper: Option<String>,
     /// What every random number of the training follows from; at most 2^63 - 1, as TOML has it.
     pub seed: u64,
     pub data: DataConfig,
@@ -43,6 +46,8 @@ pub struct ExperimentConfig {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct Shared {
     pub name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paper: Option<String>,
     pub seed: u64,
     pub data: DataConfig,
     pub optimiser: AdamConfig,
@@ -56,6 +61,7 @@ impl Default for Shared {
     fn default() -> Self {
         Self {
             name: "experiment".into(),
+            paper: None,
             seed: 1,
             data: DataConfig::default(),
             optimiser: AdamConfig::default(),
@@ -124,20 +130,36 @@ impl Default for ValidationConfig {
 }
 
 impl ExperimentConfig {
-    /// How the model's tables score it.
-    pub fn protocols(&self) -> Vec<Box<dyn Protocol>> {
-        self.model
-            .protocols(&self.data, &EvaluationOptions::default())
+    /// The paper whose protocols, tables and figures it stands in; none of a model that is not in
+    /// the registry.
+    pub fn paper(&self) -> Option<Paper> {
+        match &self.paper {
+            Some(name) => registry::papers().into_iter().find(|it| it.name == *name),
+            None => {
+                let kind = registry::find(self.model.kind())?;
+                kind.papers().into_iter().next()
+            }
+        }
     }
 
-    /// What the paper of its model prints.
+    /// How the paper's tables score it.
+    pub fn protocols(&self) -> Vec<Box<dyn Protocol>> {
+        self.protocols_with(&EvaluationOptions::default())
+    }
+
+    /// The same with what is chosen of them.
+    pub fn protocols_with(&self, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
+        let paper = self.paper();
+        paper.map_or(Vec::new(), |paper| (paper.protocols)(&self.data, options))
+    }
+
+    /// What its paper prints.
     ///
     /// # Errors
     /// A model from outside whose paper's numbers are no such file.
     pub fn printed(&self) -> Result<PrintedTables, PrintedError> {
-        match registry::find(self.model.kind()) {
-            Some(kind) => {
-                let paper = kind.paper();
+        match self.paper() {
+            Some(paper) => {
                 PrintedTables::parse(paper.printed, &format!("{}/paper.toml", paper.name))
             }
             None => Ok(PrintedTables::default()),
@@ -161,6 +183,12 @@ impl ExperimentConfig {
             &self.name,
             "letters, digits, '_', '-' and '.' only, at least one, beginning with a letter or digit",
         )?;
+        if let Some(name) = &self.paper {
+            let papers = registry::papers();
+            let known: Vec<&str> = papers.iter().map(|paper| paper.name).collect();
+            let expected = format!("one of {}", known.join(", "));
+            ValueError::unless(known.contains(&&**name), "paper", name, expected)?;
+        }
         let most_seed = i64::MAX as u64;
         let expected = format!("at most {most_seed}");
         ValueError::unless(self.seed <= most_seed, "seed", self.seed, expected)?;

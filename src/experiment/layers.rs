@@ -368,6 +368,7 @@ fn parse_layer(
     let shared: Shared = shared.try_into().map_err(unread)?;
     let config = ExperimentConfig {
         name: shared.name,
+        paper: shared.paper,
         seed: shared.seed,
         data: shared.data,
         model: kind.read(given.clone()).map_err(unread)?,

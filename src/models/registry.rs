@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use super::settings::ModelKind;
+use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::transition::Kind;
 
@@ -37,6 +37,17 @@ pub fn kinds() -> Vec<Arc<dyn ModelKind>> {
     let mut kinds = built_in();
     kinds.extend(added.iter().cloned());
     kinds
+}
+
+/// The papers of all kinds, each once, in their order.
+pub fn papers() -> Vec<Paper> {
+    let mut papers: Vec<Paper> = Vec::new();
+    for paper in kinds().iter().flat_map(|kind| kind.papers()) {
+        if papers.iter().all(|known| known.name != paper.name) {
+            papers.push(paper);
+        }
+    }
+    papers
 }
 
 /// The kind of this name.

@@ -28,6 +28,9 @@ pub struct Paper {
     pub printed: &'static str,
     /// What draws its figures.
     pub figures: Option<DrawFigures>,
+    /// How its tables score a model, for data that is read like this. The first protocol also
+    /// scores a training on validation clips.
+    pub protocols: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,
 }
 
 /// A kind of model: what a config's `model.kind` names.
@@ -40,8 +43,9 @@ pub trait ModelKind: Send + Sync {
         self.name()
     }
 
-    /// The paper whose tables and figures its models stand in.
-    fn paper(&self) -> Paper;
+    /// The papers whose tables and figures its models may stand in, by a config's `paper`: the first
+    /// where a config names none.
+    fn papers(&self) -> Vec<Paper>;
 
     /// The tables of a config that are its own, `[model]` among them, with the default of every
     /// key.
@@ -125,9 +129,6 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         None
     }
-
-    /// How its tables score a model. The first protocol also scores a training on validation clips.
-    fn protocols(&self, data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>>;
 
     /// Compares the gradient of its loss with central differences, in f64 and, unless `full_size`,
     /// in small sizes. A title and a report for each way to compute the loss.

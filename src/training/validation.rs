@@ -31,7 +31,7 @@ impl<'d> Validation<'d> {
             lengths: asked.lengths.clone().unwrap_or_default(),
             most_windows: Some(asked.windows),
         };
-        let mut protocols = config.model.protocols(&config.data, &options).into_iter();
+        let mut protocols = config.protocols_with(&options).into_iter();
         let protocol = protocols.next().ok_or_else(|| {
             let kind = config.model.kind();
             TrainingError::Refused(format!(

@@ -7,7 +7,7 @@ use std::f64::consts::{LN_2, PI, TAU};
 use keydance::autograd::{AutogradError, BlockId, BufferId, Parameters, Tape};
 use keydance::data::{DataConfig, DataPart, Dataset, Recording};
 use keydance::evaluation::{
-    Better, Evaluation, EvaluationError, EvaluationOptions, Metric, Protocol, ScoreRow, Scores,
+    Better, Evaluation, EvaluationError, Metric, Protocol, ScoreRow, Scores,
 };
 use keydance::models::generator::{Condition, Given, NeededPoses, Needs};
 use keydance::models::settings::{InitialRng, LoadError, ValueError};
@@ -61,13 +61,14 @@ impl ModelKind for ToyKind {
         "toy"
     }
 
-    fn paper(&self) -> Paper {
-        Paper {
+    fn papers(&self) -> Vec<Paper> {
+        vec![Paper {
             name: "toy2026",
             printed: "title = 'Toy 2026'\ncolumns = ['all']\n[[tables]]\nnumber = 1\nmetric = 'nll'\n\
                 [rows.toy]\ntitle = 'Toy'\nnll = [2.5]",
             figures: None,
-        }
+            protocols: |_, _| vec![Box::new(ToyProtocol)],
+        }]
     }
 
     fn defaults(&self) -> Table {
@@ -113,10 +114,6 @@ impl ModelSettings for Toy {
         let weights = Weights::new(&mut Initialiser::new(&mut parameters, rng));
         saved.load_into(&mut parameters, &Statistics::default())?;
         Ok(Box::new(TrainedToy::new(name, &weights, &parameters)))
-    }
-
-    fn protocols(&self, _: &DataConfig, _: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
-        vec![Box::new(ToyProtocol)]
     }
 
     fn clone_box(&self) -> Box<dyn ModelSettings> {

@@ -25,14 +25,28 @@ pub use losses::keyframe_weights;
 pub use network::Pan2021;
 pub use prior::Prior;
 
+use crate::data::DataConfig;
+use crate::evaluation::equations::Equations;
+use crate::evaluation::published::Published;
+use crate::evaluation::transitions::TransitionScoring;
+use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::models::settings::Paper;
 
-/// The paper and the numbers that it prints.
+/// The paper, the numbers that it prints and how they are counted.
 pub const PAPER: Paper = Paper {
     name: "pan2021",
     printed: include_str!("../../../experiments/pan2021/paper.toml"),
     figures: Some(crate::report::figures::pan2021::draw),
+    protocols,
 };
+
+fn protocols(data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
+    let scoring = TransitionScoring::new(data.features(), options);
+    vec![
+        Box::new(Equations(scoring.clone())),
+        Box::new(Published(scoring)),
+    ]
+}
 
 /// The group of learning rates of the controllers' Transformers, which a large rate switches off
 /// (docs/notes/why-the-controllers-switched-off.md).

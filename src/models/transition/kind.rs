@@ -59,8 +59,8 @@ impl ModelKind for Kind {
         }
     }
 
-    fn paper(&self) -> Paper {
-        PAPER
+    fn papers(&self) -> Vec<Paper> {
+        vec![PAPER]
     }
 
     fn defaults(&self) -> Table {

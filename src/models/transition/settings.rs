@@ -11,10 +11,6 @@ use super::{ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::DataConfig;
-use crate::evaluation::equations::Equations;
-use crate::evaluation::published::Published;
-use crate::evaluation::transitions::TransitionScoring;
-use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::experiment::ExperimentConfig;
 use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
@@ -184,14 +180,6 @@ impl ModelSettings for TransitionSettings {
 
     fn untrained(&self, data: &DataConfig) -> Option<Box<dyn Generator>> {
         self.model.untrained(data.contact_threshold)
-    }
-
-    fn protocols(&self, data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
-        let scoring = TransitionScoring::new(data.features(), options);
-        vec![
-            Box::new(Equations(scoring.clone())),
-            Box::new(Published(scoring)),
-        ]
     }
 
     fn check_gradients(
