@@ -84,6 +84,9 @@ pub enum Split {
     /// train. For choices that are to hold for dancers whom the model does not know, without a look
     /// at the test clips. A clip shows the dancer whose name stands before its first "_".
     UnseenDancers(Vec<String>),
+    /// LaFAN1: files `theme_subjectN.bvh`; subject 5 tests, the others train. Numbers of files and
+    /// frames other than those of its 77 files are warned of.
+    Lafan1,
     /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest
     /// tests.
     Share(f64),

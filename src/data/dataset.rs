@@ -11,7 +11,7 @@ use thiserror::Error;
 use super::config::DataConfig;
 use super::folder::{clip_files, left_out};
 use super::reading::{FileReading, grouped};
-use super::split::{Parts, check_dance_frames, split};
+use super::split::{Parts, check_dance_frames, lafan1_warning, split};
 use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
@@ -211,7 +211,7 @@ impl Dataset {
         let digest = digest(all().map(|clip| (clip.recording.name(), &*clip.digest)));
         let warnings = grouped(all().map(|clip| (clip.recording.name(), &clip.notices[..])));
         let clips = |part: Vec<ReadClip>| part.into_iter().map(|clip| clip.recording).collect();
-        let dataset = Self {
+        let mut dataset = Self {
             train: clips(train),
             validation: clips(validation),
             test: clips(test),
@@ -219,6 +219,7 @@ impl Dataset {
             warnings,
         };
         check_dance_frames(&dataset, origin, config)?;
+        dataset.warnings.extend(lafan1_warning(&dataset, config));
         Ok(dataset)
     }
 }

@@ -10,6 +10,11 @@ use crate::counted::counted;
 const DANCE_TRAIN: (usize, usize) = (98, 93_347);
 const DANCE_TEST: (usize, usize) = (25, 20_879);
 
+/// The subject whose clips test.
+const LAFAN1_TEST: &str = "subject5";
+/// LaFAN1 in full: files that train, files that test, frames of all.
+const LAFAN1: (usize, usize, usize) = (64, 13, 496_672);
+
 /// Names of the files of each part.
 #[derive(Debug, PartialEq)]
 pub(super) struct Parts {
@@ -72,6 +77,21 @@ pub(super) fn split(
             }
             (train, test)
         }
+        Split::Lafan1 => {
+            let is_test = |name: &String| subject_of(name) == Some(LAFAN1_TEST);
+            let (test, train): (Vec<_>, Vec<_>) = names.iter().cloned().partition(is_test);
+            if train.is_empty() || test.is_empty() {
+                let found = format!(
+                    "has {} of {LAFAN1_TEST} and {} of others by their names",
+                    counted(test.len(), "clip"),
+                    train.len()
+                );
+                let config = "split = \"lafan1\", which trains on theme_subject1.bvh to \
+                              theme_subject4.bvh and tests on theme_subject5.bvh";
+                return Err(misfit(config.into(), found));
+            }
+            (train, test)
+        }
         Split::Share(share) => {
             if !(*share > 0.0 && *share < 1.0) {
                 let expected = "a share above 0 and below 1";
@@ -115,6 +135,12 @@ fn dancer_of(name: &str) -> &str {
     name.split('_').next().unwrap_or(name)
 }
 
+/// The subject of a clip of LaFAN1: what stands after the last "_" of its name.
+fn subject_of(name: &str) -> Option<&str> {
+    let stem = name.strip_suffix(".bvh").unwrap_or(name);
+    stem.rsplit_once('_').map(|(_, subject)| subject)
+}
+
 /// The rule that gives the paper's training frames: number the sorted names from 1, sort
 /// `"{number}_{name}"` bytewise, the first `count` train.
 fn cut(names: &[String], count: usize) -> (Vec<String>, Vec<String>) {
@@ -143,6 +169,21 @@ fn set_aside(clips: Vec<String>, share: f64) -> (Vec<String>, Vec<String>) {
 /// Rounds down, but forgives what a share such as 0.29 lacks in binary.
 fn floor(number: f64) -> usize {
     (number + 1e-9).floor() as usize
+}
+
+/// What is to be known of a part of LaFAN1: how much of it is there.
+pub(super) fn lafan1_warning(dataset: &Dataset, config: &DataConfig) -> Option<String> {
+    let (train, test, frames) = LAFAN1;
+    let clips = || dataset.train.iter().chain(&dataset.validation);
+    let (train_found, test_found) = (clips().count(), dataset.test.len());
+    let found = clips().chain(&dataset.test).map(Recording::frames).sum();
+    let whole = (train_found, test_found, found) == (train, test, frames);
+    (config.split == Split::Lafan1 && !whole).then(|| {
+        format!(
+            "LaFAN1 has {train} training and {test} test clips of {frames} frames, this folder \
+             {train_found} and {test_found} of {found}: its scores are not the benchmark's"
+        )
+    })
 }
 
 /// Checks the frame counts of the paper's split.

@@ -4,6 +4,9 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::contact_foot::{MissingJoint, joint_called};
+use super::skeleton::Skeleton;
+
 /// The joints that lie across the body; forward is at a right angle to both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FacingJoints {
@@ -19,6 +22,26 @@ impl FacingJoints {
         hips: [1, 5],
         arms: [19, 15],
     };
+
+    /// Those of a skeleton by their names: `LeftUpLeg` and `RightUpLeg`, `LeftArm` and `RightArm`.
+    ///
+    /// # Errors
+    /// A joint is missing.
+    pub fn of(skeleton: &Skeleton) -> Result<Self, MissingJoint> {
+        let joint = |name| joint_called(skeleton, &[name]);
+        Ok(Self {
+            hips: [joint("LeftUpLeg")?, joint("RightUpLeg")?],
+            arms: [joint("LeftArm")?, joint("RightArm")?],
+        })
+    }
+
+    /// The angle about Y that a body by itself faces, rad: 0 looks along +Z, pi/2 along +X.
+    ///
+    /// `positions`: of the joints in one frame, `[joints]`.
+    pub fn angle(&self, positions: &[DVec3]) -> f64 {
+        let forward = self.forward(positions);
+        forward.x.atan2(forward.y)
+    }
 
     /// `across x up`, as (x, z); not normalised, so that a frame with a foreshortened body counts
     /// less in the smoothing.

@@ -6,6 +6,7 @@
 pub mod bvh;
 pub mod clip;
 pub mod contact;
+pub mod contact_foot;
 pub mod facing;
 pub mod features;
 pub mod fit;
@@ -16,13 +17,16 @@ pub mod mirror;
 pub mod oddities;
 pub mod placement;
 pub mod resample;
+pub mod root_reconstruction;
 pub mod rotation_fit;
+pub mod rotation_window;
 pub mod skeleton;
 pub mod tempo;
 pub mod units;
 pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
+pub use contact_foot::{ContactRule, Feet, Foot, MissingJoint};
 pub use features::{FeatureConfig, FeatureError, features};
 pub use mapping::{Mapping, MappingError};
 pub use mirror::mirror_image;
