@@ -81,12 +81,18 @@ fn shapes_that_do_not_fit_are_named_with_the_operation() {
 
 #[test]
 fn arguments_that_do_not_fit_a_shape_are_named_with_both() {
-    let cases: [(&str, &[usize], &str, Build); 6] = [
+    let cases: [(&str, &[usize], &str, Build); 8] = [
         ("reshape", &[2, 3], "[7]", |t, a, _| t.reshape(a, &[7])),
         ("columns", &[2, 3], "2..4", |t, a, _| t.columns(a, 2..4)),
         ("rows", &[2, 3], "1..3", |t, a, _| t.rows(a, 1..3)),
         ("strided_rows", &[5, 2], "steps of 2", |t, a, _| {
             t.strided_rows(a, 0, 2)
+        }),
+        ("cumulative_sum", &[5, 2], "of 2 frames", |t, a, _| {
+            t.cumulative_sum(a, 2)
+        }),
+        ("drop_path", &[5, 2], "of 2 rows", |t, a, _| {
+            t.drop_path(a, 0.0, 2)
         }),
         ("prelu", &[2, 3], "[2, 3]", |t, a, _| t.prelu(a, a)),
         ("attention", &[6, 8], "width: 6", |t, a, _| {

@@ -465,6 +465,28 @@ fn add_layer_norm_is_dropout_add_and_layer_norm() {
     }
 }
 
+struct LogSoftmax;
+
+impl Pair for LogSoftmax {
+    fn shapes(&self) -> Vec<Vec<usize>> {
+        vec![vec![4, 19]]
+    }
+
+    fn fused<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var]) -> Result<Var> {
+        Ok(tape.log_softmax(v[0]))
+    }
+
+    fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
+        let p = tape.softmax(v[0]);
+        Ok(tape.ln(p))
+    }
+}
+
+#[test]
+fn log_softmax_is_ln_of_softmax() {
+    agree_in_both(&LogSoftmax, false);
+}
+
 struct SumLast;
 
 impl Pair for SumLast {
