@@ -1,6 +1,7 @@
 //! Layers as structs of parameters; names, layouts and initial values are PyTorch's.
 
 mod attention;
+mod convolution;
 mod init;
 mod linear;
 mod lstm;
@@ -11,6 +12,7 @@ mod positions;
 mod transformer;
 
 pub use attention::{MultiHeadAttention, NarrowAttention};
+pub use convolution::Convolution;
 pub use init::{Initialiser, MOST_WEIGHTS};
 pub use linear::Linear;
 pub use lstm::Lstm;

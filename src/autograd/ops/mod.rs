@@ -16,6 +16,7 @@ mod broadcast;
 mod clamp;
 mod columns;
 mod concat;
+mod convolve_rows;
 mod cumulative_sum;
 mod div;
 mod drop_path;
@@ -110,6 +111,7 @@ mod gradient_is_that_of_central_differences {
         clamp,
         columns,
         concat,
+        convolve_rows,
         cumulative_sum,
         div,
         drop_path,

@@ -46,7 +46,7 @@ impl Numbers {
 }
 
 /// Every operation, on whatever operands and numbers.
-const OPERATIONS: [(&str, Operation); 46] = [
+const OPERATIONS: [(&str, Operation); 47] = [
     ("abs", |t, v, _| Ok(t.abs(v[0]))),
     ("add", |t, v, _| t.add(v[0], v[1])),
     ("add_layer_norm", |t, v, n| {
@@ -62,6 +62,9 @@ const OPERATIONS: [(&str, Operation); 46] = [
     ("clamp", |t, v, n| Ok(t.clamp(v[0], n.real, 1.0))),
     ("columns", |t, v, n| t.columns(v[0], n.sizes[0]..n.sizes[1])),
     ("concat", |t, v, n| t.concat(&v[..n.sizes[0].min(3)])),
+    ("convolve_rows", |t, v, n| {
+        t.convolve_rows(v[0], v[1], v[2], n.sizes[0])
+    }),
     ("cumulative_sum", |t, v, n| {
         t.cumulative_sum(v[0], n.sizes[0])
     }),
