@@ -9,6 +9,7 @@ pub mod measure;
 mod mlp;
 mod norm;
 mod positions;
+mod pre_norm;
 mod transformer;
 
 pub use attention::{MultiHeadAttention, NarrowAttention};
@@ -19,4 +20,5 @@ pub use lstm::Lstm;
 pub use mlp::{Activation, LastLayer, Mlp};
 pub use norm::LayerNorm;
 pub use positions::sinusoidal_positions;
+pub use pre_norm::PreNormEncoderLayer;
 pub use transformer::{TransformerDecoderLayer, TransformerEncoderLayer, TransformerSizes};
