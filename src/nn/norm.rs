@@ -1,4 +1,4 @@
-//! Layer norm behind a residual add.
+//! Layer norm, alone or behind a residual add.
 
 use rand::Rng;
 
@@ -23,6 +23,15 @@ impl LayerNorm {
             weight: init.constant(format!("{name}.weight"), &[width], 1.0).1,
             bias: init.constant(format!("{name}.bias"), &[width], 0.0).1,
         }
+    }
+
+    /// `norm(x)`, `[.., n]`.
+    ///
+    /// # Errors
+    /// An input of another width.
+    pub fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
+        let (weight, bias) = (tape.block(self.weight), tape.block(self.bias));
+        tape.layer_norm(x, weight, bias)
     }
 
     /// `norm(residual + dropout(x))`, all `[.., n]`.

@@ -1,5 +1,5 @@
 //! The arithmetic under the engine: matrix products, those of attention's small windows, vectorised
-//! exponentials, dropout masks.
+//! exponentials, the normal distribution, dropout masks.
 //!
 //! The only place of the crate with `unsafe` code. Everything public here is safe: operands are
 //! slices with a shape, and a shape that does not fit its slice or its partners panics.
@@ -20,6 +20,7 @@ mod gemm;
 mod isa;
 mod math;
 mod matrix;
+mod normal;
 mod packed;
 mod product;
 mod real;

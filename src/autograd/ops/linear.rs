@@ -128,7 +128,7 @@ impl<T: Real> Tape<'_, T> {
     }
 }
 
-fn add_bias<T: Real>(y: &mut [T], bias: Option<&[T]>, outputs: usize, relu: bool) {
+pub(super) fn add_bias<T: Real>(y: &mut [T], bias: Option<&[T]>, outputs: usize, relu: bool) {
     if outputs == 0 || (bias.is_none() && !relu) {
         return;
     }

@@ -16,13 +16,18 @@ mod broadcast;
 mod clamp;
 mod columns;
 mod concat;
+mod convolve_rows;
+mod cumulative_sum;
 mod div;
+mod drop_path;
 mod dropout;
 mod exp;
 mod forward_kinematics;
+mod gelu;
 mod layer_norm;
 mod linear;
 mod ln;
+mod log_softmax;
 pub mod lstm_cell;
 mod matmul;
 mod mean;
@@ -106,13 +111,18 @@ mod gradient_is_that_of_central_differences {
         clamp,
         columns,
         concat,
+        convolve_rows,
+        cumulative_sum,
         div,
+        drop_path,
         dropout,
         exp,
         forward_kinematics,
+        gelu,
         layer_norm,
         linear,
         ln,
+        log_softmax,
         lstm_cell,
         matmul,
         mean,

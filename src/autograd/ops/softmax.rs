@@ -29,7 +29,7 @@ impl<T: Real> Operation<T> for Softmax {
 }
 
 /// x - max in place for one row; a NaN is its maximum.
-fn shift<T: Real>(row: &mut [T]) {
+pub(super) fn shift<T: Real>(row: &mut [T]) {
     let larger = |max: T, &x: &T| if x > max || x.is_nan() { x } else { max };
     let max = row.iter().fold(T::neg_infinity(), larger);
     row.iter_mut().for_each(|x| *x -= max);

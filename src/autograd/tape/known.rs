@@ -43,13 +43,14 @@ impl<'s, T: Real> Known<'s, T> {
             .expect("a value has as many numbers as its shape says")
     }
 
-    /// A weight `[out, in]` as a matrix.
+    /// A weight `[out, in]`, or `[out, ..]` with the axes behind as one, as a matrix.
     fn matrix(self, weight: Var) -> Mat<'s, T> {
         let shape = self.shape(weight);
-        Mat::new(self.values(weight), shape[0], shape[1])
+        let columns = shape[1..].iter().product();
+        Mat::new(self.values(weight), shape[0], columns)
     }
 
-    /// out (+)= x W for a weight W `[out, in]`, packed where it is a parameter.
+    /// out (+)= x W for a weight W `[out, ..]`, packed where it is a parameter.
     pub(in crate::autograd) fn product(
         self,
         x: Mat<'_, T>,
@@ -63,7 +64,7 @@ impl<'s, T: Real> Known<'s, T> {
         }
     }
 
-    /// out (+)= x W^T for a weight W `[out, in]`, packed where it is a parameter.
+    /// out (+)= x W^T for a weight W `[out, ..]`, packed where it is a parameter.
     pub(in crate::autograd) fn product_transposed(
         self,
         x: Mat<'_, T>,

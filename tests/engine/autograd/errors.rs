@@ -21,7 +21,7 @@ fn refusal(left: &[usize], right: &[usize], build: Build) -> String {
 
 #[test]
 fn shapes_that_do_not_fit_are_named_with_the_operation() {
-    let cases: [(&str, &[usize], &[usize], Build); 14] = [
+    let cases: [(&str, &[usize], &[usize], Build); 17] = [
         ("add", &[2, 3], &[2, 4], |t, a, b| t.add(a, b)),
         ("sub", &[2, 3], &[3, 3], |t, a, b| t.sub(a, b)),
         ("mul", &[5], &[4], |t, a, b| t.mul(a, b)),
@@ -36,6 +36,16 @@ fn shapes_that_do_not_fit_are_named_with_the_operation() {
         }),
         ("stack", &[2, 3], &[3, 2], |t, a, b| t.stack(&[a, b])),
         ("concat", &[2, 3], &[3, 3], |t, a, b| t.concat(&[a, b])),
+        ("convolve_rows", &[2, 3], &[4, 5, 3], |t, a, b| {
+            t.convolve_rows(a, b, a, 2)
+        }),
+        ("convolve_rows", &[2, 3], &[4, 3, 2], |t, a, b| {
+            t.convolve_rows(a, b, a, 2)
+        }),
+        ("convolve_rows", &[4, 3, 3], &[3], |t, a, b| {
+            let x = t.constant(ArrayD::zeros(IxDyn(&[2, 3])));
+            t.convolve_rows(x, a, b, 2)
+        }),
         ("layer_norm", &[2, 3], &[4], |t, a, b| t.layer_norm(a, b, b)),
         ("add_layer_norm", &[2, 3], &[2, 4], |t, a, b| {
             let gamma = t.constant(ArrayD::ones(IxDyn(&[3])));
@@ -81,12 +91,22 @@ fn shapes_that_do_not_fit_are_named_with_the_operation() {
 
 #[test]
 fn arguments_that_do_not_fit_a_shape_are_named_with_both() {
-    let cases: [(&str, &[usize], &str, Build); 6] = [
+    let cases: [(&str, &[usize], &str, Build); 9] = [
         ("reshape", &[2, 3], "[7]", |t, a, _| t.reshape(a, &[7])),
         ("columns", &[2, 3], "2..4", |t, a, _| t.columns(a, 2..4)),
         ("rows", &[2, 3], "1..3", |t, a, _| t.rows(a, 1..3)),
         ("strided_rows", &[5, 2], "steps of 2", |t, a, _| {
             t.strided_rows(a, 0, 2)
+        }),
+        ("cumulative_sum", &[5, 2], "of 2 frames", |t, a, _| {
+            t.cumulative_sum(a, 2)
+        }),
+        ("drop_path", &[5, 2], "of 2 rows", |t, a, _| {
+            t.drop_path(a, 0.0, 2)
+        }),
+        ("convolve_rows", &[5, 2], "of 2 frames", |t, a, b| {
+            let weight = t.constant(ArrayD::zeros(IxDyn(&[1, 2, 3])));
+            t.convolve_rows(a, weight, b, 2)
         }),
         ("prelu", &[2, 3], "[2, 3]", |t, a, _| t.prelu(a, a)),
         ("attention", &[6, 8], "width: 6", |t, a, _| {

@@ -55,6 +55,15 @@ fn softmax_holds<T: Real>(largest: f64) {
 }
 
 #[test]
+fn log_softmax_is_exact_where_the_softmax_is_0() {
+    let input = vec![array::<f32>(&[1, 3], &[0.0, -1e30, -200.0])];
+    let (y, dx) = run(input, |tape, v| Ok(tape.log_softmax(v[0])));
+    assert_eq!(y, [0.0, f64::from(-1e30f32), -200.0]);
+    // Upstream 1, 2, 3 minus p times their sum.
+    assert_eq!(dx, [[-5.0, 2.0, 3.0]]);
+}
+
+#[test]
 fn softmax_stays_finite_for_the_largest_logits_and_shows_a_nan() {
     softmax_holds::<f64>(1e300);
     softmax_holds::<f32>(1e38);
@@ -176,10 +185,14 @@ fn functions_saturate<T: Real>() {
     assert_eq!((y, dx), (vec![1.0, -1.0, 1.0, -1.0], vec![vec![0.0; 4]]));
     let (y, dx) = run(input(), |tape, v| Ok(tape.clamp(v[0], 0.0, 1.0)));
     assert_eq!((y, dx), (vec![1.0, 0.0, 1.0, 0.0], vec![vec![0.0; 4]]));
+    let large = T::from_f64(1e30).to_f64();
+    let (y, dx) = run(input(), |tape, v| Ok(tape.gelu(v[0])));
+    let slopes = vec![vec![1.0, 0.0, 3.0, 0.0]];
+    assert_eq!((y, dx), (vec![large, 0.0, 1e3, 0.0], slopes));
 }
 
 #[test]
-fn sigmoid_tanh_and_clamp_saturate_without_a_gradient() {
+fn sigmoid_tanh_clamp_and_gelu_saturate_without_a_gradient() {
     functions_saturate::<f64>();
     functions_saturate::<f32>();
 }

@@ -465,6 +465,73 @@ fn add_layer_norm_is_dropout_add_and_layer_norm() {
     }
 }
 
+struct ConvolveRows;
+
+impl Pair for ConvolveRows {
+    fn shapes(&self) -> Vec<Vec<usize>> {
+        vec![vec![8, 5], vec![6, 5, 3], vec![6]]
+    }
+
+    fn fused<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var]) -> Result<Var> {
+        tape.convolve_rows(v[0], v[1], v[2], 4)
+    }
+
+    /// A product for each place in the kernel, with the rows that it meets.
+    fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
+        let zeros = tape.constant_with(&[1, 5], |out| out.fill(T::zero()));
+        let weights = tape.reshape(v[1], &[30, 3])?;
+        let mut sum = None;
+        for w in 0..3 {
+            let mut rows = Vec::new();
+            for row in 0..8 {
+                let inside = (1..5).contains(&(row % 4 + w));
+                rows.push(match inside {
+                    true => tape.rows(v[0], row + w - 1..row + w)?,
+                    false => zeros,
+                });
+            }
+            let x = tape.stack(&rows)?;
+            let x = tape.reshape(x, &[8, 5])?;
+            let weight = tape.columns(weights, w..w + 1)?;
+            let weight = tape.reshape(weight, &[6, 5])?;
+            let bias = (w == 1).then_some(v[2]);
+            let y = tape.linear(x, weight, bias, false)?;
+            sum = match sum {
+                None => Some(y),
+                Some(sum) => Some(tape.add(sum, y)?),
+            };
+        }
+        Ok(sum.unwrap())
+    }
+}
+
+#[test]
+fn convolve_rows_is_a_product_for_each_place_in_the_kernel() {
+    agree_in_both(&ConvolveRows, false);
+}
+
+struct LogSoftmax;
+
+impl Pair for LogSoftmax {
+    fn shapes(&self) -> Vec<Vec<usize>> {
+        vec![vec![4, 19]]
+    }
+
+    fn fused<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var]) -> Result<Var> {
+        Ok(tape.log_softmax(v[0]))
+    }
+
+    fn composed<T: Real>(&self, tape: &mut Tape<'_, T>, v: &[Var], _: &Cell<usize>) -> Result<Var> {
+        let p = tape.softmax(v[0]);
+        Ok(tape.ln(p))
+    }
+}
+
+#[test]
+fn log_softmax_is_ln_of_softmax() {
+    agree_in_both(&LogSoftmax, false);
+}
+
 struct SumLast;
 
 impl Pair for SumLast {

@@ -100,6 +100,7 @@ fn lanes_and_slices_have_the_same_bits() {
     check(f32::exp_slice, f32::exp_lane);
     check(f32::tanh_slice, f32::tanh_lane);
     check(f32::sigmoid_slice, f32::sigmoid_lane);
+    check(f32::gelu_slice, f32::gelu_lane);
 }
 
 #[test]

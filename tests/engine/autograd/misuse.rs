@@ -46,7 +46,7 @@ impl Numbers {
 }
 
 /// Every operation, on whatever operands and numbers.
-const OPERATIONS: [(&str, Operation); 42] = [
+const OPERATIONS: [(&str, Operation); 47] = [
     ("abs", |t, v, _| Ok(t.abs(v[0]))),
     ("add", |t, v, _| t.add(v[0], v[1])),
     ("add_layer_norm", |t, v, n| {
@@ -62,20 +62,29 @@ const OPERATIONS: [(&str, Operation); 42] = [
     ("clamp", |t, v, n| Ok(t.clamp(v[0], n.real, 1.0))),
     ("columns", |t, v, n| t.columns(v[0], n.sizes[0]..n.sizes[1])),
     ("concat", |t, v, n| t.concat(&v[..n.sizes[0].min(3)])),
+    ("convolve_rows", |t, v, n| {
+        t.convolve_rows(v[0], v[1], v[2], n.sizes[0])
+    }),
+    ("cumulative_sum", |t, v, n| {
+        t.cumulative_sum(v[0], n.sizes[0])
+    }),
     ("detach", |t, v, _| Ok(t.detach(v[0]))),
     ("div", |t, v, _| t.div(v[0], v[1])),
+    ("drop_path", |t, v, n| t.drop_path(v[0], n.real, n.sizes[0])),
     ("dropout", |t, v, n| Ok(t.dropout(v[0], n.real))),
     ("exp", |t, v, _| Ok(t.exp(v[0]))),
     ("forward_kinematics", |t, v, n| {
         let parents = [None, Some(0), Some(n.sizes[0])];
         t.forward_kinematics(v[0], v[1], &parents[..n.sizes[1].min(3)])
     }),
+    ("gelu", |t, v, _| Ok(t.gelu(v[0]))),
     ("layer_norm", |t, v, _| t.layer_norm(v[0], v[1], v[2])),
     ("linear", |t, v, _| t.linear(v[0], v[1], Some(v[2]), true)),
     ("linear without a bias", |t, v, _| {
         t.linear(v[0], v[1], None, false)
     }),
     ("ln", |t, v, _| Ok(t.ln(v[0]))),
+    ("log_softmax", |t, v, _| Ok(t.log_softmax(v[0]))),
     ("lstm_cell", |t, v, _| {
         let weights = LstmWeights {
             weight_ih: v[2],
