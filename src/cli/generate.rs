@@ -2,6 +2,7 @@
 //! them as BVH.
 
 mod keyframes;
+mod rotations;
 mod trajectory;
 mod velocity;
 
@@ -14,7 +15,7 @@ use clap::Args;
 use super::file_units::FileUnits;
 use super::notice::warn;
 use crate::counted::counted;
-use crate::models::generator::NeededPoses;
+use crate::models::generator::{Condition, NeededPoses};
 use crate::models::transition::DataRanges;
 use crate::motion::bvh;
 use crate::report::viewer::generated_page;
@@ -22,6 +23,7 @@ use crate::run::{Subject, beside_clips, check_outputs, replace_file, write_json}
 use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, Summary, SynthesisOptions, control_warnings, synthesise};
 use keyframes::KeyframeArgs;
+use rotations::ContactArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
 
@@ -51,6 +53,8 @@ pub struct GenerateArgs {
     trajectory: TrajectoryArgs,
     #[command(flatten)]
     velocity: VelocityArgs,
+    #[command(flatten)]
+    contacts: ContactArgs,
     /// Pin the feet where the model predicts contact
     #[arg(long)]
     foot_cleanup: bool,
@@ -61,8 +65,8 @@ pub struct GenerateArgs {
     /// Write what is printed here, too, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Override a key of the config; of a run's model only model.velocity_refinement, such as
-    /// model.velocity_refinement=false; may be repeated
+    /// Override a key of the config; of a run's model only one that acts after the network, such
+    /// as model.velocity_refinement=false or rtr.meet_target=linear; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Replace files that are there already
@@ -91,6 +95,9 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
+    if needs.poses == NeededPoses::Keyframes {
+        return rotations::run(&args, &subject);
+    }
     let data = args.units.over(&subject.config.data);
     let keyframes = Keyframes::read(&choice, &data)?;
     warn(keyframes.notices());
@@ -100,7 +107,9 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let run = subject.run.as_ref();
     let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
     let ranges = ranges.transpose()?.flatten();
-    let asked = [args.trajectory.asked(), args.velocity.asked()];
+    let contacts = args.contacts.contacts.as_ref();
+    let contacts = contacts.map(|_| Condition::Contacts);
+    let asked = [args.trajectory.asked(), args.velocity.asked(), contacts];
     let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
     warnings.extend(unread.map(ControlWarning::Unread));
     warnings.extend(control_warnings(&request, ranges.as_ref()));

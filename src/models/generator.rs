@@ -7,7 +7,7 @@ use ndarray::{Array1, Array2, Array3};
 use thiserror::Error;
 
 use super::settings::ValueError;
-use crate::motion::{Clip, Pose, Skeleton};
+use crate::motion::{Clip, ContactRule, Pose, Skeleton};
 
 /// A pose that is given at a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,6 +109,11 @@ pub trait Generator: Send + Sync {
     /// # Errors
     /// A request that does not fit together or to the model.
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError>;
+
+    /// How a recording's foot in contact is told where the model is given it.
+    fn contact_rule(&self) -> ContactRule {
+        ContactRule::default()
+    }
 
     /// [`Motion::raw`] of every request, without the rest.
     ///

@@ -5,7 +5,9 @@ use std::fmt;
 
 use super::ModelError;
 use super::settings::{GradientCheckOptions, ModelSettings};
-use crate::autograd::check::{CheckReport, ParameterReport};
+use super::{CRITICS, LossTerms};
+use crate::autograd::check::{CheckReport, ParameterReport, check_parameters};
+use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
 
 /// Largest error that passes.
 const TOLERANCE: f64 = 1e-5;
@@ -74,6 +76,38 @@ impl fmt::Display for GradientReport {
             self.error()
         )
     }
+}
+
+/// Compares the gradient of a loss with central differences: for critics of their own part of it,
+/// for all other weights of the rest (see [`LossTerms::critics`]). `dropout` is the key of its
+/// random masks, the same at every evaluation.
+///
+/// # Errors
+/// What `losses` returns; numbers that are not finite.
+pub fn check_losses(
+    parameters: &mut Parameters<f64>,
+    dropout: Option<u64>,
+    per_parameter: usize,
+    losses: impl Fn(&mut Tape<'_, f64>) -> Result<LossTerms, AutogradError>,
+) -> Result<CheckReport, AutogradError> {
+    let mut workspace = Workspace::new();
+    let mut gradients = Gradients::zeros(parameters);
+    let mut tape = Tape::recording(parameters, &mut workspace);
+    tape.set_dropout(dropout);
+    let total = losses(&mut tape)?.total;
+    tape.check_finite()?;
+    tape.backward(total, &mut gradients)?;
+    check_parameters(parameters, &gradients, per_parameter, |parameters, name| {
+        let mut tape = Tape::inference(parameters, &mut workspace);
+        tape.set_dropout(dropout);
+        let losses = losses(&mut tape)?;
+        let total = tape.values(losses.total)[0];
+        let critics = losses.critics.map_or(0.0, |it| tape.values(it)[0]);
+        Ok(match name.starts_with(CRITICS) {
+            true => critics,
+            false => total - critics,
+        })
+    })
 }
 
 /// A row for each part of the network: what its parameters' names begin with.

@@ -4,17 +4,24 @@
 //! - [`generator`]: what a user, an evaluation or `generate` may ask of one;
 //! - [`settings`]: what the commands ask of a kind of model;
 //! - [`registry`]: the list of kinds;
-//! - [`transition`]: what the models of transitions between two keyframes share.
+//! - [`transition`]: what the models of transitions between two keyframes share;
+//! - [`rotations`]: what the models of rotations on any skeleton share.
 
 #[cfg(feature = "papers")]
 pub mod baselines;
+#[cfg(feature = "papers")]
+pub mod duan2022;
 pub mod generator;
 pub mod gradient_report;
 #[cfg(feature = "papers")]
 pub mod harvey2020;
 #[cfg(feature = "papers")]
+pub mod li2023;
+#[cfg(feature = "papers")]
 pub mod pan2021;
 pub mod registry;
+#[cfg(feature = "papers")]
+pub mod rotations;
 pub mod settings;
 mod statistics;
 pub mod streams;

@@ -4,7 +4,10 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
-use super::transition::Kind;
+use super::{
+    baselines::rotations::RotationBaseline, duan2022::Duan2022Kind, li2023::Li2023Kind,
+    transition::Kind,
+};
 
 /// Kinds that were [added](add) from outside.
 static ADDED: RwLock<Vec<Arc<dyn ModelKind>>> = RwLock::new(Vec::new());
@@ -17,11 +20,19 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         #[cfg(feature = "papers")]
         Arc::new(Kind::Harvey2020),
         #[cfg(feature = "papers")]
+        Arc::new(Li2023Kind),
+        #[cfg(feature = "papers")]
+        Arc::new(Duan2022Kind),
+        #[cfg(feature = "papers")]
         Arc::new(Kind::Interpolation),
         #[cfg(feature = "papers")]
         Arc::new(Kind::LinearPositions),
         #[cfg(feature = "papers")]
         Arc::new(Kind::ZeroVelocity),
+        #[cfg(feature = "papers")]
+        Arc::new(RotationBaseline::Slerp),
+        #[cfg(feature = "papers")]
+        Arc::new(RotationBaseline::HeldPose),
     ]
 }
 

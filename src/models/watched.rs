@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use super::generator::Needs;
 use super::{Generator, ModelError, Motion, Request};
+use crate::motion::ContactRule;
 
 /// A model that asks before each answer whether to go on, and says how many frames it answered.
 pub struct Watched<'a> {
@@ -36,6 +37,10 @@ impl Generator for Watched<'_> {
 
     fn needs(&self) -> Needs {
         self.model.needs()
+    }
+
+    fn contact_rule(&self) -> ContactRule {
+        self.model.contact_rule()
     }
 
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {

@@ -166,6 +166,15 @@ impl SavedWeights {
         Ok(array.mapv(f64::from))
     }
 
+    /// One of the model's [`Statistics`] that is a list of any length.
+    ///
+    /// # Errors
+    /// It is not there, or has several axes.
+    pub fn statistic_list(&self, name: &str) -> Result<Vec<f64>, WeightsError> {
+        let len = self.arrays.get(name).map_or(0, ArrayD::len);
+        Ok(self.statistic(name, &[len])?.into_iter().collect())
+    }
+
     fn array(&self, name: &str, expected: &[usize]) -> Result<&ArrayD<f32>, WeightsError> {
         let path = self.path.display();
         let array = self.arrays.get(name).ok_or_else(|| {

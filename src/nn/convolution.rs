@@ -25,7 +25,18 @@ impl Convolution {
         (inputs, outputs): (usize, usize),
         width: usize,
     ) -> Result<Self, AutogradError> {
-        let shape = [outputs, inputs, width];
+        let bound = 1.0 / (inputs as f64 * width as f64).sqrt();
+        Self::within(init, name, [outputs, inputs, width], bound)
+    }
+
+    /// With weights uniform within `bound`.
+    fn within<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        shape: [usize; 3],
+        bound: f64,
+    ) -> Result<Self, AutogradError> {
+        let [outputs, _, width] = shape;
         if width.is_multiple_of(2) {
             return Err(AutogradError::Argument {
                 operation: "convolve_rows",
@@ -34,11 +45,24 @@ impl Convolution {
                 expected: "an odd number",
             });
         }
-        let bound = 1.0 / (inputs as f64 * width as f64).sqrt();
         Ok(Self {
             weight: init.uniform(format!("{name}.weight"), &shape, bound).1,
             bias: init.uniform(format!("{name}.bias"), &[outputs], bound).1,
         })
+    }
+
+    /// [`Convolution::new`], with 0 for every weight: whatever goes in, 0 comes out until it is
+    /// trained.
+    ///
+    /// # Errors
+    /// An even width.
+    pub fn of_zeros<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        (inputs, outputs): (usize, usize),
+        width: usize,
+    ) -> Result<Self, AutogradError> {
+        Self::within(init, name, [outputs, inputs, width], 0.0)
     }
 
     /// `x [windows * frames, in]` -> `[windows * frames, out]`.

@@ -16,11 +16,13 @@ pub struct TransformerSizes {
     pub dropout: f64,
 }
 
-/// Linear, ReLU, Linear.
+/// Linear, ReLU or GELU, Linear.
 #[derive(Debug, Clone, Copy)]
 struct FeedForward {
     linear1: Linear,
     linear2: Linear,
+    /// GELU in the place of ReLU.
+    gelu: bool,
 }
 
 impl FeedForward {
@@ -33,11 +35,18 @@ impl FeedForward {
         Self {
             linear1: Linear::new(init, &format!("{name}.linear1"), d, wide),
             linear2: Linear::new(init, &format!("{name}.linear2"), wide, d),
+            gelu: false,
         }
     }
 
     fn forward<T: Real>(&self, tape: &mut Tape<'_, T>, x: Var) -> Result<Var, AutogradError> {
-        let x = self.linear1.forward_relu(tape, x)?;
+        let x = match self.gelu {
+            true => {
+                let x = self.linear1.forward(tape, x)?;
+                tape.gelu(x)
+            }
+            false => self.linear1.forward_relu(tape, x)?,
+        };
         self.linear2.forward(tape, x)
     }
 }
@@ -67,6 +76,13 @@ impl TransformerEncoderLayer {
             norms: [1, 2].map(|k| LayerNorm::new(init, &format!("{name}.norm{k}"), sizes.width)),
             dropout: sizes.dropout,
         })
+    }
+
+    /// The same with GELU in the place of ReLU.
+    #[must_use]
+    pub fn with_gelu(mut self) -> Self {
+        self.feed_forward.gelu = true;
+        self
     }
 
     /// Tokens `x [windows * tokens, d]`, in windows of `tokens`, to the same shape.

@@ -61,6 +61,14 @@ pub enum SynthesisError {
         to: usize,
         source: Box<ModelError>,
     },
+    #[error("frame {frame} has two contacts; give each frame one, such as left:0-9,right:10-24")]
+    ContactTwice { frame: usize },
+    #[error("the contacts name frame {frame}; the frames of the result are 0 to {last}")]
+    ContactBeyond { frame: usize, last: usize },
+    #[error(
+        "frame {frame} of the {frames} frames of the result has no contact; give each frame one"
+    )]
+    NoContact { frame: usize, frames: usize },
     #[error("{model} gave no transition for a request")]
     NoTransition { model: String },
     #[error("the frames from {from} to {to} of the result have no rotations")]

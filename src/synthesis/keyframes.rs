@@ -124,6 +124,14 @@ pub enum KeyframeError {
         last: usize,
     },
     #[error(
+        "{} has {} joints, {} has {}; take keyframes from files on one skeleton",
+        files[0], joints[0], files[1], joints[1]
+    )]
+    OtherJoints {
+        files: [String; 2],
+        joints: [usize; 2],
+    },
+    #[error(
         "--length puts the last keyframe at frame {end} of the result, beyond {LONGEST} frames; give smaller lengths"
     )]
     TooLong { end: usize },
@@ -145,6 +153,93 @@ pub enum KeyframeError {
     },
     #[error(transparent)]
     Synthesis(#[from] SynthesisError),
+}
+
+/// The keyframes of a choice in their order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct TimedKeyframes {
+    /// File, frame and time of every keyframe, by time.
+    pub keyframes: Vec<FileKeyframe>,
+    /// The dancer's file and its first keyframe.
+    pub motion: Option<(PathBuf, usize)>,
+}
+
+impl TimedKeyframes {
+    /// # Errors
+    /// No keyframes, one only, or out of order.
+    pub fn of(choice: &KeyframeChoice) -> Result<Self, KeyframeError> {
+        let mut keyframes = choice.further.clone();
+        let mut motion = None;
+        if let Some((file, frames)) = &choice.motion {
+            if let Some(pair) = frames.windows(2).find(|pair| pair[1] <= pair[0]) {
+                let (before, frame) = (pair[0], pair[1]);
+                return Err(KeyframeError::Order { before, frame });
+            }
+            let first = frames.first().copied().unwrap_or(0);
+            motion = Some((file.clone(), first));
+            keyframes.extend(frames.iter().map(|&frame| FileKeyframe {
+                file: file.clone(),
+                frame,
+                time: frame - first,
+            }));
+        }
+        keyframes.sort_by_key(|keyframe| keyframe.time);
+        match &keyframes[..] {
+            [] => return Err(KeyframeError::None),
+            [_] => return Err(KeyframeError::One),
+            [first, ..] if first.time > 0 => {
+                return Err(KeyframeError::First { time: first.time });
+            }
+            _ => {}
+        }
+        let same = |pair: &&[FileKeyframe]| pair[0].time == pair[1].time;
+        if let Some(pair) = keyframes.windows(2).find(same) {
+            return Err(KeyframeError::SameTime {
+                time: pair[0].time,
+                files: [&pair[0], &pair[1]]
+                    .map(|keyframe| format!("{}:{}", keyframe.file.display(), keyframe.frame)),
+            });
+        }
+        Ok(Self { keyframes, motion })
+    }
+}
+
+/// The channels of a file where every joint turns: those that a result is written with.
+pub(super) fn kept_channels(document: &Bvh) -> Option<Vec<Vec<Channel>>> {
+    let turns = |channels: &Vec<Channel>| {
+        let rotations = channels
+            .iter()
+            .filter(|c| matches!(c, Channel::Rotation(_)));
+        rotations.count() == 3
+    };
+    let channels = document.channels();
+    channels.iter().all(turns).then(|| channels.to_vec())
+}
+
+/// Times of keyframes by the frames from each to the next: none where none are given, one number
+/// for all, or one for each.
+pub(super) fn lengthened(
+    lengths: &[u32],
+    keyframes: usize,
+) -> Result<Option<Vec<usize>>, KeyframeError> {
+    let lengths = match *lengths {
+        [] => return Ok(None),
+        [length] => vec![length as usize; keyframes - 1],
+        _ if lengths.len() != keyframes - 1 => {
+            let lengths = lengths.len();
+            return Err(KeyframeError::Lengths { lengths, keyframes });
+        }
+        _ => lengths.iter().map(|&length| length as usize).collect(),
+    };
+    let mut times = vec![0];
+    for length in lengths {
+        times.push(times[times.len() - 1] + length);
+    }
+    let end = times[times.len() - 1];
+    match end > LONGEST as usize {
+        true => Err(KeyframeError::TooLong { end }),
+        false => Ok(Some(times)),
+    }
 }
 
 /// A file that was read.
@@ -173,40 +268,7 @@ impl Keyframes {
     /// # Errors
     /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton.
     pub fn read(choice: &KeyframeChoice, data: &DataConfig) -> Result<Self, KeyframeError> {
-        let mut keyframes = choice.further.clone();
-        let mut motion = None;
-        if let Some((file, frames)) = &choice.motion {
-            if let Some(pair) = frames.windows(2).find(|pair| pair[1] <= pair[0]) {
-                let (before, frame) = (pair[0], pair[1]);
-                return Err(KeyframeError::Order { before, frame });
-            }
-            let first = frames.first().copied().unwrap_or(0);
-            motion = Some((file.clone(), first));
-            keyframes.extend(frames.iter().map(|&frame| FileKeyframe {
-                file: file.clone(),
-                frame,
-                time: frame - first,
-            }));
-        }
-        keyframes.sort_by_key(|keyframe| keyframe.time);
-        match &keyframes[..] {
-            [] => return Err(KeyframeError::None),
-            [_] => return Err(KeyframeError::One),
-            [first, ..] if first.time > 0 => {
-                return Err(KeyframeError::First { time: first.time });
-            }
-            _ => {}
-        }
-        if let Some(pair) = keyframes
-            .windows(2)
-            .find(|pair| pair[0].time == pair[1].time)
-        {
-            return Err(KeyframeError::SameTime {
-                time: pair[0].time,
-                files: [&pair[0], &pair[1]]
-                    .map(|keyframe| format!("{}:{}", keyframe.file.display(), keyframe.frame)),
-            });
-        }
+        let TimedKeyframes { keyframes, motion } = TimedKeyframes::of(choice)?;
         let mapping = match &choice.mapping {
             Some(path) => Some(Mapping::read(path)?),
             None => data.mapping.clone(),
@@ -241,14 +303,7 @@ impl Keyframes {
         let document = bvh::read(path)?;
         let clip = document.to_clip();
         let own = clip.skeleton.is_dance_skeleton();
-        let turns = |channels: &Vec<Channel>| {
-            let rotations = channels
-                .iter()
-                .filter(|c| matches!(c, Channel::Rotation(_)));
-            rotations.count() == 3
-        };
-        let channels = document.channels();
-        let channels = (own && channels.iter().all(turns)).then(|| channels.to_vec());
+        let channels = kept_channels(&document).filter(|_| own);
         let mapping = self.mapping.as_ref().filter(|_| !own);
         let (clip, notices) =
             DanceClip::from_file(clip, mapping, &self.data).map_err(|source| {
@@ -357,25 +412,9 @@ impl Keyframes {
             });
         }
         let request = request.like(clip, *first)?;
-        let lengths = match *lengths {
-            [] => return Ok(request),
-            [length] => vec![length as usize; self.keyframes.len() - 1],
-            _ => lengths.iter().map(|&length| length as usize).collect(),
-        };
-        let mut times = vec![0];
-        for length in lengths {
-            times.push(times[times.len() - 1] + length);
+        match lengthened(lengths, self.keyframes.len())? {
+            Some(times) => Ok(request.at_times(&times)?),
+            None => Ok(request),
         }
-        let end = times[times.len() - 1];
-        if end > LONGEST as usize {
-            return Err(KeyframeError::TooLong { end });
-        }
-        request.at_times(&times).map_err(|error| match error {
-            SynthesisError::Times { keyframes, times } => KeyframeError::Lengths {
-                lengths: times - 1,
-                keyframes,
-            },
-            other => other.into(),
-        })
     }
 }

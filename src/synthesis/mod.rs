@@ -6,6 +6,8 @@
 //! pins the feet.
 
 mod blend;
+pub mod clip_keyframes;
+mod completion;
 pub mod controls;
 mod error;
 mod foot_cleanup;
@@ -17,6 +19,7 @@ mod sequence;
 mod summary;
 mod warning;
 
+pub use completion::{Completion, CompletionRequest, CompletionSummary, ContactSequence, complete};
 pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
 pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};

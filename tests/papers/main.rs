@@ -18,6 +18,7 @@ mod golden;
 mod golden_run;
 mod harvey2020;
 mod interpolation;
+mod li2023;
 mod metrics;
 mod pan2021;
 mod preferred;

@@ -11,12 +11,13 @@ use super::training_windows::{features_of, poses_of};
 use super::{
     Batch, DanceClip, Forcing, ModelConfig, RootFrame, SingleFrame, Standardisation, Window,
 };
-use crate::autograd::check::{CheckReport, check_parameters};
-use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Workspace};
+use crate::autograd::check::CheckReport;
+use crate::autograd::{AutogradError, Parameters};
 use crate::data::choreography::{ChoreographyConfig, ChoreographyError, generate};
 use crate::data::{DataConfig, DataError};
+use crate::models::ModelError;
+use crate::models::gradient_report::check_losses;
 use crate::models::settings::GradientCheckOptions;
-use crate::models::{CRITICS, ModelError};
 use crate::nn::Initialiser;
 
 /// Transitions with more and with fewer frames than two times m = 5 (the two cases of eq. 10).
@@ -169,30 +170,8 @@ pub fn check_model(
         value.mapv_inplace(|x| x + rng.random_range(-NOISE..NOISE));
     }
     let key = case.dropout.then_some(DROPOUT_KEY);
-    let mut workspace = Workspace::new();
-    let mut gradients = Gradients::zeros(&parameters);
-    let mut tape = Tape::recording(&parameters, &mut workspace);
-    tape.set_dropout(key);
-    let total = network.losses(&mut tape, &batch, case.forcing)?.total;
-    tape.check_finite()?;
-    tape.backward(total, &mut gradients)?;
-    let report = check_parameters(
-        &mut parameters,
-        &gradients,
-        options.per_parameter,
-        |parameters, name| {
-            let mut tape = Tape::inference(parameters, &mut workspace);
-            tape.set_dropout(key);
-            let losses = network.losses(&mut tape, &batch, case.forcing)?;
-            let total = tape.values(losses.total)[0];
-            let critics = losses
-                .critics
-                .map_or(0.0, |critics| tape.values(critics)[0]);
-            Ok(match name.starts_with(CRITICS) {
-                true => critics,
-                false => total - critics,
-            })
-        },
-    )?;
+    let report = check_losses(&mut parameters, key, options.per_parameter, |tape| {
+        network.losses(tape, &batch, case.forcing)
+    })?;
     Ok(Some(report))
 }

@@ -43,6 +43,7 @@ pub use pose_windows::PoseWindows;
 pub use ranges::DataRanges;
 pub use request::{KeyframePose, Transition, TransitionModel, TransitionRequest, check_frames};
 pub use root_frame::RootFrame;
+pub(crate) use schedule::parts;
 pub use schedule::{BatchPlan, Schedule};
 pub use settings::{
     AugmentationConfig, ScheduleConfig, ScheduledSamplingConfig, TransitionSettings,

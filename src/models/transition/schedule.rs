@@ -180,7 +180,7 @@ impl Schedule {
 }
 
 /// `0..len` in `count` ranges whose lengths differ by one at most, the longer ones first.
-pub(super) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+pub(crate) fn parts(len: usize, count: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
     let (small, larger) = (len / count.max(1), len % count.max(1));
     (0..count).map(move |k| {
         let start = k * small + k.min(larger);

@@ -1,0 +1,168 @@
+//! Baselines of rotations on any skeleton: slerp between the keyframes, and the first one held.
+
+use ndarray::Array3;
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use crate::data::DataConfig;
+use crate::models::generator::{Motion, NeededPoses, Needs, Request};
+use crate::models::li2023;
+use crate::models::settings::{
+    InitialRng, LoadError, ModelKind, ModelSettings, Paper, TaskSetting, ValueError,
+};
+use crate::models::weights::SavedWeights;
+use crate::models::{Generator, ModelError, Task};
+use crate::motion::Pose;
+use crate::nn::Initialiser;
+
+/// A baseline without weights: a line of the registry, and the model itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationBaseline {
+    /// Each joint's rotation along the shorter arc between the keyframes around a frame, the root
+    /// on a straight line: "Interpolation" of Li et al.'s table 1.
+    Slerp,
+    /// Pose and root of the first keyframe held: "zero velocity" of the LaFAN1 benchmark.
+    HeldPose,
+}
+
+/// `[model]` with nothing but its kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    model: KindOnly,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KindOnly {
+    kind: RotationBaseline,
+}
+
+impl RotationBaseline {
+    const ALL: [(Self, &'static str); 2] = [(Self::Slerp, "slerp"), (Self::HeldPose, "held_pose")];
+
+    fn title(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(kind, _)| *kind == self);
+        found.map_or("", |(_, name)| name)
+    }
+}
+
+impl ModelKind for RotationBaseline {
+    fn name(&self) -> &str {
+        self.title()
+    }
+
+    fn papers(&self) -> Vec<Paper> {
+        vec![li2023::DANCE, li2023::LAFAN1]
+    }
+
+    fn defaults(&self) -> Table {
+        let kind = self.title().into();
+        let model = Table::from_iter([("kind".to_string(), kind)]);
+        Table::from_iter([("model".to_string(), model.into())])
+    }
+
+    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
+        Ok(Box::new(tables.try_into::<Settings>()?))
+    }
+}
+
+impl ModelSettings for Settings {
+    fn kind(&self) -> &str {
+        self.model.kind.title()
+    }
+
+    fn tables(&self) -> Result<Table, toml::ser::Error> {
+        Table::try_from(self)
+    }
+
+    fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
+        Ok(())
+    }
+
+    fn task<'d>(
+        &self,
+        _setting: &TaskSetting<'d>,
+        _init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
+        Err(self.model.kind.untrained())
+    }
+
+    fn trained(&self, _name: &str, _saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
+        Err(self.model.kind.untrained().into())
+    }
+
+    fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
+        Some(Box::new(self.model.kind))
+    }
+
+    fn clone_box(&self) -> Box<dyn ModelSettings> {
+        Box::new(self.clone())
+    }
+}
+
+impl RotationBaseline {
+    fn untrained(self) -> ModelError {
+        ModelError::Model {
+            model: self.title().into(),
+            reason: "has no weights and needs no training; evaluate its config as it is".into(),
+        }
+    }
+
+    /// Poses of every frame, `[F]`.
+    fn poses(self, request: &Request) -> Vec<Pose> {
+        let keyframes = request.given.iter().filter(|given| given.frame >= 0);
+        let keyframes: Vec<(f64, &Pose)> = keyframes
+            .map(|given| (given.frame as f64, &given.pose))
+            .collect();
+        let frames = 0..request.frames;
+        frames
+            .map(|frame| {
+                let frame = frame as f64;
+                let after = keyframes.partition_point(|(at, _)| *at <= frame);
+                let end = after.clamp(1, keyframes.len() - 1);
+                let ((from, start), (to, target)) = (keyframes[end - 1], keyframes[end]);
+                match self {
+                    Self::Slerp => start.towards(target, (frame - from) / (to - from)),
+                    Self::HeldPose if frame == to => target.clone(),
+                    Self::HeldPose => start.clone(),
+                }
+            })
+            .collect()
+    }
+}
+
+impl Generator for RotationBaseline {
+    fn name(&self) -> &str {
+        self.title()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs {
+            poses: NeededPoses::Keyframes,
+            conditions: &[],
+            heeds: &[],
+        }
+    }
+
+    fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
+        let motion = |request: &Request| {
+            request.check(self.title(), &self.needs())?;
+            if request.frames < 2 {
+                return Err(ModelError::NoFrames {
+                    rows: request.frames,
+                });
+            }
+            let poses = self.poses(request);
+            let world = request.skeleton.world_positions(&poses);
+            let shape = (poses.len(), request.skeleton.len(), 3);
+            let at = |(frame, joint, axis): (usize, usize, usize)| world[frame][joint][axis];
+            Ok(Motion {
+                poses: Some(poses),
+                ..Motion::new(Array3::from_shape_fn(shape, at))
+            })
+        };
+        requests.iter().map(motion).collect()
+    }
+}

@@ -1,0 +1,155 @@
+//! What a config says of a model of rotations, and what all of them do with it.
+
+use std::fmt::Debug;
+
+use rand::Rng;
+use serde::Serialize;
+use toml::Table;
+
+use super::gradient_check;
+use super::made_up::MadeUpTask;
+use super::task::RotationTask;
+use super::trained::{Reference, TrainedRotations};
+use super::{AugmentationConfig, Body, RotationNetwork, ScheduleConfig, WindowStatistics};
+use crate::autograd::check::CheckReport;
+use crate::autograd::{Parameters, Real};
+use crate::data::DataConfig;
+use crate::models::settings::{
+    GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
+};
+use crate::models::transition::RootFrame;
+use crate::models::weights::SavedWeights;
+use crate::models::{Generator, ModelError, Statistics, Streams, Task};
+use crate::motion::ContactRule;
+use crate::nn::Initialiser;
+
+/// The tables of a model of rotations; each is a [`ModelSettings`] through that.
+pub trait RotationSettings: Serialize + Clone + Debug + Send + Sync + 'static {
+    /// Its name in a config.
+    const KIND: &'static str;
+    /// Keys that act after the network.
+    const AFTER_THE_NETWORK: &'static [&'static str] = &[];
+
+    fn schedule(&self) -> &ScheduleConfig;
+
+    fn augmentation(&self) -> &AugmentationConfig;
+
+    fn root_frame(&self) -> RootFrame;
+
+    /// How recorded frames are labelled.
+    fn contact_rule(&self) -> ContactRule;
+
+    /// Checks the values that are its own.
+    ///
+    /// # Errors
+    /// The first out of its range.
+    fn check_own(&self) -> Result<(), ValueError>;
+
+    /// The network, its weights added through `init`.
+    ///
+    /// # Errors
+    /// Sizes that do not fit together.
+    fn network<T: Real, R: Rng>(
+        &self,
+        init: &mut Initialiser<'_, T, R>,
+        body: &Body,
+        statistics: &WindowStatistics,
+    ) -> Result<Box<dyn RotationNetwork<T>>, ModelError>;
+
+    /// The same structure in small sizes, for checks in f64.
+    fn small(&self) -> Self;
+}
+
+/// [`RotationSettings::network`] within the limit of weights.
+pub(super) fn build<S: RotationSettings, T: Real, R: Rng>(
+    settings: &S,
+    init: &mut Initialiser<'_, T, R>,
+    body: &Body,
+    statistics: &WindowStatistics,
+) -> Result<Box<dyn RotationNetwork<T>>, ModelError> {
+    let network = settings.network(init, body, statistics)?;
+    match init.exceeded() {
+        None => Ok(network),
+        Some(most) => Err(ModelError::TooLarge { most }),
+    }
+}
+
+impl<S: RotationSettings> ModelSettings for S {
+    fn kind(&self) -> &str {
+        S::KIND
+    }
+
+    fn tables(&self) -> Result<Table, toml::ser::Error> {
+        Table::try_from(self)
+    }
+
+    fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
+        self.schedule().check()?;
+        let tempi = &self.augmentation().tempi;
+        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
+        ValueError::unless(
+            usable,
+            "augmentation.tempi",
+            format!("{tempi:?}"),
+            "at most 16 tempi from 0.25 to 4",
+        )?;
+        self.check_own()
+    }
+
+    fn budget_note(&self) -> String {
+        self.schedule().budget()
+    }
+
+    fn keys_after_the_network(&self) -> &'static [&'static str] {
+        S::AFTER_THE_NETWORK
+    }
+
+    fn task<'d>(
+        &self,
+        setting: &TaskSetting<'d>,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
+        let build = |body: &_, statistics: &_| build(self, init, body, statistics);
+        Ok(Box::new(RotationTask::new(self, setting, build)?))
+    }
+
+    fn made_up_task(
+        &self,
+        frames: usize,
+        batch: usize,
+        streams: Streams,
+        init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32>>, ModelError> {
+        Ok(Box::new(MadeUpTask::new(
+            self, frames, batch, streams, init,
+        )?))
+    }
+
+    fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
+        let body = Body::saved(saved)?;
+        let statistics = WindowStatistics::saved(saved, &body)?;
+        let mut parameters = Parameters::new();
+        let rng = Streams::new(0).initialisation();
+        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
+        let network = build(self, &mut init, &body, &statistics)?;
+        let known = statistics.statistics(body.statistics(Statistics::default()));
+        saved.load_into(&mut parameters, &known)?;
+        let reference = Reference::new(body, self)?;
+        let trained = TrainedRotations::new(name, network.into(), parameters, reference);
+        Ok(Box::new(trained))
+    }
+
+    fn check_gradients(
+        &self,
+        options: &GradientCheckOptions,
+    ) -> Result<Vec<(String, CheckReport)>, ModelError> {
+        match options.full_size {
+            true => gradient_check::check_all(self, options),
+            false => gradient_check::check_all(&self.small(), options),
+        }
+    }
+
+    fn clone_box(&self) -> Box<dyn ModelSettings> {
+        Box::new(self.clone())
+    }
+}
