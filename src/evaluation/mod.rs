@@ -14,6 +14,8 @@ pub mod scores;
 pub mod tables;
 #[cfg(feature = "papers")]
 pub mod transitions;
+#[cfg(feature = "papers")]
+mod windows;
 
 pub use metric::{Better, Metric};
 pub use printed::{PrintedError, PrintedRow, PrintedTable, PrintedTables};

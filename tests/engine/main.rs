@@ -33,3 +33,4 @@ mod split;
 mod streams;
 mod units;
 mod velocity_factor;
+mod windows;
