@@ -3,6 +3,8 @@
 
 #[cfg(feature = "papers")]
 pub mod equations;
+#[cfg(feature = "papers")]
+pub mod in_betweening;
 mod metric;
 mod printed;
 pub mod protocol;
