@@ -8,6 +8,7 @@ mod part;
 mod reading;
 mod split;
 mod twins;
+mod windows;
 
 pub use config::{DataConfig, Split};
 pub use dataset::{DataError, Dataset, Recording};
@@ -15,3 +16,4 @@ pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};
 pub use part::{DataPart, EmptyPart};
 pub use reading::FileReading;
+pub use windows::{Window, WindowCut};

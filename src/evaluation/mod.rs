@@ -3,6 +3,8 @@
 
 #[cfg(feature = "papers")]
 pub mod equations;
+#[cfg(feature = "papers")]
+pub mod in_betweening;
 mod metric;
 mod printed;
 pub mod protocol;
@@ -14,6 +16,8 @@ pub mod scores;
 pub mod tables;
 #[cfg(feature = "papers")]
 pub mod transitions;
+#[cfg(feature = "papers")]
+mod windows;
 
 pub use metric::{Better, Metric};
 pub use printed::{PrintedError, PrintedRow, PrintedTable, PrintedTables};

@@ -298,6 +298,14 @@ impl Motion {
         check_shape("predicted positions", &[frames, joints, 3], positions)?;
         if let Some(poses) = &self.poses {
             check_shape("predicted poses", &[frames], &[poses.len()])?;
+            for Pose {
+                translations,
+                rotations,
+            } in poses
+            {
+                let found = [translations.len(), rotations.len()];
+                check_shape("a predicted pose", &[joints, joints], &found)?;
+            }
         }
         if let Some(facing) = &self.facing {
             check_shape("predicted facing angles", &[frames], facing.shape())?;

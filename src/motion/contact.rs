@@ -57,12 +57,48 @@ pub fn foot_skate<const FEET: usize>(
     feet: [usize; FEET],
     contacts: &[[bool; FEET]],
 ) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0);
+    foot_travel(world, feet, contacts).mean()
+}
+
+/// What [`foot_skate`] is the mean of.
+pub fn foot_travel<const FEET: usize>(
+    world: &[Vec<DVec3>],
+    feet: [usize; FEET],
+    contacts: &[[bool; FEET]],
+) -> FootTravel {
+    let mut travel = FootTravel::default();
     for (pair, contacts) in world.windows(2).zip(contacts.iter().skip(1)) {
         for (joint, _) in feet.iter().zip(contacts).filter(|(_, on)| **on) {
-            sum += pair[1][*joint].distance(pair[0][*joint]);
-            count += 1;
+            travel.step(pair[0][*joint], pair[1][*joint]);
         }
     }
-    (count > 0).then(|| sum / f64::from(count))
+    travel
+}
+
+/// How far feet have moved, and in how many steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FootTravel {
+    /// cm.
+    pub distance: f64,
+    /// Number of feet and frames.
+    pub steps: usize,
+}
+
+impl FootTravel {
+    /// A foot has gone from one place (cm) to another from a frame to the next.
+    pub fn step(&mut self, from: DVec3, to: DVec3) {
+        self.distance += to.distance(from);
+        self.steps += 1;
+    }
+
+    /// What several have moved together.
+    pub fn add(&mut self, other: Self) {
+        self.distance += other.distance;
+        self.steps += other.steps;
+    }
+
+    /// The mean step, cm/frame; none where there was none.
+    pub fn mean(&self) -> Option<f64> {
+        (self.steps > 0).then(|| self.distance / self.steps as f64)
+    }
 }

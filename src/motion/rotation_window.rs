@@ -15,16 +15,24 @@ pub fn nearer_sign(q: DQuat, to: DQuat) -> DQuat {
 ///
 /// `rotations`: `[frames][joints]`.
 pub fn make_continuous(rotations: &mut [Vec<DQuat>]) {
-    let Some(first) = rotations.first_mut() else {
+    let Some(first) = rotations.first() else {
         return;
     };
-    first
-        .iter_mut()
-        .for_each(|q| *q = if q.w < 0.0 { -*q } else { *q });
-    for time in 1..rotations.len() {
-        let (before, after) = rotations.split_at_mut(time);
-        let joints = after[0].iter_mut().zip(&before[time - 1]);
+    let positive = |q: &DQuat| if q.w < 0.0 { -*q } else { *q };
+    let first: Vec<DQuat> = first.iter().map(positive).collect();
+    continue_from(&first, rotations);
+}
+
+/// Gives each rotation the sign that is nearer to the one before; what comes before the first is
+/// `before`.
+///
+/// `before`: `[joints]`; `rotations`: `[frames][joints]`.
+pub fn continue_from(before: &[DQuat], rotations: &mut [Vec<DQuat>]) {
+    let mut before = before;
+    for frame in rotations {
+        let joints = frame.iter_mut().zip(before);
         joints.for_each(|(q, before)| *q = nearer_sign(*q, *before));
+        before = frame;
     }
 }
 

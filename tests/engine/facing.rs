@@ -2,8 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec2;
-use keydance::motion::facing::{gaussian, unwrap};
+use glam::{DVec2, DVec3};
+use keydance::motion::facing::{FacingJoints, gaussian, unwrap};
+
+use crate::dance_clip::turning_clip;
 
 #[test]
 fn smoothing_agrees_with_scipy() {
@@ -41,4 +43,22 @@ fn unwrapped_angles_take_the_short_way() {
             .all(|(found, expected)| (found - expected).abs() < 1e-12),
         "{angles:?}"
     );
+}
+
+#[test]
+fn a_body_by_itself_faces_where_it_was_turned_to_on_any_skeleton_with_the_joints() {
+    for angle in [-3.0, -0.5, 0.0, 1.0, 3.1] {
+        let clip = turning_clip("a", 1, |_| (DVec3::new(7.0, 90.0, -3.0), angle));
+        let joints = FacingJoints::of(&clip.skeleton).unwrap();
+        assert_eq!(joints, FacingJoints::DANCE);
+        let positions = clip.poses[0].world_positions(&clip.skeleton);
+        assert!((joints.angle(&positions) - angle).abs() < 1e-12, "{angle}");
+    }
+    let mut skeleton = turning_clip("a", 1, |_| (DVec3::Y, 0.0)).skeleton;
+    skeleton.joints.swap(1, 5);
+    let swapped = FacingJoints::of(&skeleton).unwrap();
+    assert_eq!(swapped.hips, [5, 1]);
+    skeleton.joints[15].name = "RightUpperArm".into();
+    let text = FacingJoints::of(&skeleton).unwrap_err().to_string();
+    assert!(text.contains("none called RightArm"), "{text}");
 }

@@ -1,6 +1,8 @@
 //! The autograd engine, motions, data sets, and what a training goes on with.
 
 // What several of these tests need.
+#[path = "../common/lafan1_data.rs"]
+mod lafan1_data;
 #[path = "../common/martial_data.rs"]
 mod martial_data;
 #[path = "../common/real_data.rs"]
@@ -14,6 +16,7 @@ mod autograd;
 mod bvh;
 mod choreography;
 mod contact;
+mod contact_foot;
 mod dataset;
 mod facing;
 mod features;
@@ -22,9 +25,12 @@ mod ik;
 mod learning_rate;
 mod mapping;
 mod resample;
+mod root_reconstruction;
 mod rotation_fit;
+mod rotation_window;
 mod run_state;
 mod split;
 mod streams;
 mod units;
 mod velocity_factor;
+mod windows;

@@ -4,6 +4,7 @@ use glam::DVec3;
 use keydance::data::{DataConfig, DataError, Dataset, Recording, Split};
 
 use crate::dance_clip::turning_clip;
+use crate::lafan1_data::lafan1_folder;
 
 fn config(split: Split) -> DataConfig {
     DataConfig {
@@ -131,4 +132,85 @@ fn a_split_that_does_not_fit_names_both_sides() {
     assert!(message(list("a.bvh", "a.bvh"), 4).contains("a.bvh"));
     assert!(message(Split::Share(0.5), 1).contains("none for training"));
     assert!(message(Split::Share(f64::NAN), 4).contains("split.share"));
+}
+
+/// Names of clips of LaFAN1, of these themes and subjects.
+fn lafan1(clips: &[(&str, usize)]) -> Vec<String> {
+    let name = |(theme, subject): &(&str, usize)| format!("{theme}_subject{subject}.bvh");
+    clips.iter().map(name).collect()
+}
+
+#[test]
+fn lafan1_tests_on_subject_5_and_trains_on_the_others() {
+    let names = lafan1(&[
+        ("dance1", 1),
+        ("fall_and_get_up", 5),
+        ("run1", 5),
+        ("walk1", 2),
+    ]);
+    let parts = split(&names, &config(Split::Lafan1)).unwrap();
+    assert_eq!(parts.test, names[1..3]);
+    assert_eq!(parts.train, [names[0].as_str(), &names[3]]);
+    // Subject 5 alone: neither subject 50 nor a theme that is called so.
+    let names = lafan1(&[("subject5", 1), ("walk1", 5), ("walk1", 50)]);
+    let parts = split(&names, &config(Split::Lafan1)).unwrap();
+    assert_eq!(parts.test, [names[1].as_str()]);
+}
+
+#[test]
+fn another_number_of_lafan1_clips_is_used_with_a_warning_that_names_both() {
+    let names = lafan1(&[("a", 1), ("a", 2), ("a", 5), ("b", 3)]);
+    for validation_share in [0.0, 0.5] {
+        let config = DataConfig {
+            validation_share,
+            ..config(Split::Lafan1)
+        };
+        let clip = |name: &String| turning_clip(name, 7, |_| (DVec3::Y * 90.0, 0.0));
+        let dataset = Dataset::from_clips(names.iter().map(clip).collect(), &config).unwrap();
+        let [warning] = &dataset.warnings[..] else {
+            panic!("{:?}", dataset.warnings)
+        };
+        assert!(
+            warning.contains("64 training and 13 test clips of 496672 frames"),
+            "{warning}"
+        );
+        assert!(warning.contains("3 and 1 of 28"), "{warning}");
+    }
+}
+
+#[test]
+fn lafan1_without_a_clip_to_test_or_to_train_on_is_refused() {
+    for (subjects, counts) in [
+        ([1, 2], "0 clips of subject5 and 2"),
+        ([5, 5], "2 clips of subject5 and 0"),
+    ] {
+        let names = lafan1(&[("a", subjects[0]), ("b", subjects[1])]);
+        let text = split(&names, &config(Split::Lafan1))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            text.contains(counts) && text.contains("theme_subject5"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn the_part_of_lafan1_that_is_here_is_split_and_warned_of() {
+    let Some(folder) = lafan1_folder() else {
+        return;
+    };
+    let dataset = Dataset::load(&folder, &config(Split::Lafan1)).unwrap();
+    let frames = |clips: &[Recording]| clips.iter().map(Recording::frames).sum::<usize>();
+    let found = (dataset.train.len(), dataset.test.len());
+    let frames = (frames(&dataset.train), frames(&dataset.test));
+    let warned = dataset.warnings.iter().any(|it| it.contains("LaFAN1 has"));
+    match found.0 + found.1 {
+        77 => assert_eq!(
+            (found, frames.0 + frames.1, warned),
+            ((64, 13), 496_672, false)
+        ),
+        14 => assert_eq!((found, frames, warned), ((12, 2), (47_545, 7_191), true)),
+        _ => assert!(warned),
+    }
 }

@@ -3,6 +3,10 @@
 // What several of these tests need.
 #[path = "../common/generated_data.rs"]
 mod generated_data;
+#[path = "../common/lafan1_data.rs"]
+mod lafan1_data;
+#[path = "../common/real_data.rs"]
+mod real_data;
 #[path = "../common/small_run.rs"]
 mod small_run;
 
@@ -17,6 +21,7 @@ mod effect;
 mod golden;
 mod golden_run;
 mod harvey2020;
+mod in_betweening;
 mod interpolation;
 mod li2023;
 mod metrics;

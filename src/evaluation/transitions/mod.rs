@@ -5,13 +5,12 @@ mod window_request;
 
 use std::ops::Range;
 
-use ndarray::{Array2, ArrayView1, ArrayView2};
-use rayon::prelude::*;
+use ndarray::{ArrayView1, ArrayView2};
 
 use super::Metric;
 use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
 use super::scores::{ScoreRow, Scores};
-use crate::counted::counted;
+use super::windows::{CHUNK, answers, bad, failed, in_chunks, left_out, spread};
 use crate::data::{DataPart, Dataset};
 use crate::models::transition::{DanceClip, Window, check_frames, window_features, windows};
 use crate::models::{Generator, ModelError};
@@ -46,7 +45,7 @@ impl Default for TransitionScoring {
             velocity_threshold: 1.0,
             root_threshold: 7.0,
             most_windows: None,
-            chunk: 64,
+            chunk: CHUNK,
         }
     }
 }
@@ -197,19 +196,12 @@ impl TransitionScoring {
     /// Windows of so many frames, and the clips that are shorter.
     fn cut(&self, clip_frames: &[usize], frames: usize) -> (Vec<Window>, Vec<usize>) {
         let cut = windows(clip_frames, frames - 1);
-        let windows = match self.most_windows {
-            Some(most) => spread(&cut.windows, most),
-            None => cut.windows,
-        };
-        (windows, cut.skipped)
+        (spread(cut.windows, self.most_windows), cut.skipped)
     }
 }
 
 /// Asks a model about all windows and measures each answer. With them, warnings of clips that are
 /// shorter than a window.
-///
-/// Chunks of windows run in parallel on rayon's current pool. The chunks do not depend on the
-/// number of threads and their results are kept in order.
 fn measure<P: TransitionProtocol>(
     protocol: &P,
     model: &dyn Generator,
@@ -236,32 +228,12 @@ fn measure<P: TransitionProtocol>(
                 longest: clip_frames.iter().copied().max().unwrap_or(0),
             });
         }
-        warnings.extend(skipped.into_iter().map(|clip| {
-            format!(
-                "{} has {}, fewer than a window of {needed} (N = {length}): left out of the scores \
-                 at this length",
-                clips[clip].name,
-                counted(clip_frames[clip], "frame"),
-            )
-        }));
-        let chunks = cut.par_chunks(scoring.chunk.max(1));
+        let warning = |clip: usize| left_out(&clips[clip].name, clip_frames[clip], needed, length);
+        warnings.extend(skipped.into_iter().map(warning));
         let of_chunk = |chunk: &[Window]| measure_chunk(protocol, model, clips, chunk, needed);
-        let scores: Vec<Vec<P::Window>> = chunks.map(of_chunk).collect::<Result<_, _>>()?;
-        measured.push((length, scores.into_iter().flatten().collect()));
+        measured.push((length, in_chunks(&cut, scoring.chunk, of_chunk)?));
     }
     Ok((measured, warnings))
-}
-
-fn bad(reason: String) -> EvaluationError {
-    EvaluationError::Data { reason }
-}
-
-/// At most `most` of the windows, evenly spread over them.
-fn spread(windows: &[Window], most: usize) -> Vec<Window> {
-    let count = windows.len().min(most);
-    (0..count)
-        .map(|k| windows[k * windows.len() / count])
-        .collect()
 }
 
 /// Predicts and measures a chunk of windows of so many frames.
@@ -288,23 +260,12 @@ fn measure_chunk<P: TransitionProtocol>(
             })
         })
         .collect::<Result<_, _>>()?;
-    let failed = |what: String, source| EvaluationError::Model {
-        what: format!("{}, {what}", model.name()),
-        source: Box::new(source),
-    };
-    let predicted: Vec<Array2<f64>> = model.raw(&requests).map_err(|source| {
+    let what = || {
         let Window { clip, start, .. } = chunk[0];
         let clip = &clips[clip].name;
-        let what =
-            format!("a chunk of windows of {frames} frames that starts with {clip}, frame {start}");
-        failed(what, source)
-    })?;
-    if predicted.len() != chunk.len() {
-        let (model, answers, requests) = (model.name(), predicted.len(), chunk.len());
-        return Err(bad(format!(
-            "{model} gave {answers} answers to {requests} requests"
-        )));
-    }
+        format!("a chunk of windows of {frames} frames that starts with {clip}, frame {start}")
+    };
+    let predicted = answers(model, &requests, |requests| model.raw(requests), what)?;
     windows()
         .zip(&predicted)
         .map(|((window, recorded), predicted)| {
@@ -312,7 +273,7 @@ fn measure_chunk<P: TransitionProtocol>(
             scores.map_err(|source| {
                 let (clip, start) = (&clips[window.clip].name, window.start);
                 let end = start + span;
-                failed(format!("{clip}, frames {start} to {end}"), source)
+                failed(model, &format!("{clip}, frames {start} to {end}"), source)
             })
         })
         .collect()

@@ -36,6 +36,7 @@ pub mod velocity_refinement;
 pub mod window;
 mod windows;
 
+pub use crate::data::Window;
 pub use dance_clip::DanceClip;
 pub use kind::{Kind, ModelConfig, NoSettings};
 pub use network::{Batch, Forcing, Network, SingleFrame};
@@ -52,4 +53,4 @@ pub use standardisation::Standardisation;
 pub use task::TransitionTask;
 pub use trained::TrainedModel;
 pub use window::window_features;
-pub use windows::{Window, Windows, windows};
+pub use windows::{Windows, windows};

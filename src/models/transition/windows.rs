@@ -1,18 +1,11 @@
 //! Which windows are cut from the clips.
 
-/// One window: N + 1 frames of a clip, from `start` on (frame k1 = `start`, k2 = `start + N`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
-    /// Index of the clip.
-    pub clip: usize,
-    /// Index of the window's first frame in the clip.
-    pub start: usize,
-}
+use crate::data::{Window, WindowCut};
 
 /// The windows of one length, and the clips that are too short for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Windows {
-    /// By clip, then by start.
+    /// N + 1 frames each (frame k1 = `start`, k2 = `start + N`); by clip, then by start.
     pub windows: Vec<Window>,
     /// Indices of the clips with fewer than N + 1 frames.
     pub skipped: Vec<usize>,
@@ -21,21 +14,14 @@ pub struct Windows {
 /// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every
 /// ceil(0.1 (N + 1)) frames.
 pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
-    let length = transition + 1;
-    let stride = length.div_ceil(10);
-    let mut found = Windows {
-        windows: Vec::new(),
-        skipped: Vec::new(),
+    let frames = transition + 1;
+    let cut = WindowCut {
+        frames,
+        every: frames.div_ceil(10),
+        strictly: false,
     };
-    for (clip, &frames) in clip_frames.iter().enumerate() {
-        match frames.checked_sub(length) {
-            Some(last) => found.windows.extend(
-                (0..=last)
-                    .step_by(stride)
-                    .map(|start| Window { clip, start }),
-            ),
-            None => found.skipped.push(clip),
-        }
+    Windows {
+        windows: cut.windows(clip_frames),
+        skipped: cut.too_short(clip_frames),
     }
-    found
 }
