@@ -10,6 +10,8 @@ pub struct Metric {
     /// Such as "cm" or "share of windows".
     pub unit: &'static str,
     pub better: Better,
+    /// Digits behind the point in tables.
+    pub decimals: usize,
     /// What it is, in a few words, and the equation that defines it.
     pub about: &'static str,
 }

@@ -122,7 +122,7 @@ impl<'a> ProtocolTable<'a> {
         });
         let mut lines = Vec::new();
         if let Some(paper) = &paper {
-            lines.push(("paper".to_string(), cells(paper, false)));
+            lines.push(("paper".to_string(), cells(paper, metric)));
         }
         let scores = |row: &TableRow| -> Option<Vec<Option<f64>>> {
             let row = self.scores(row)?.row(metric.key);
@@ -137,7 +137,7 @@ impl<'a> ProtocolTable<'a> {
                 let compared = same || column != AVERAGE;
                 Some((*ours)? - paper.filter(|_| compared)?)
             });
-            Some(cells(&differences.collect::<Vec<_>>(), true))
+            Some(signed_cells(&differences.collect::<Vec<_>>(), metric))
         };
         let absent = || vec![ABSENT.to_string(); columns.len()];
         let by_seed = group.differ_in_seed_only();
@@ -148,7 +148,7 @@ impl<'a> ProtocolTable<'a> {
                 _ => "ours".to_string(),
             };
             let ours = scores(row);
-            let shown = ours.as_ref().map(|ours| cells(ours, false));
+            let shown = ours.as_ref().map(|ours| cells(ours, metric));
             lines.push((kind, shown.unwrap_or_else(absent)));
             if paper.is_some() && !by_seed {
                 let difference = ours.and_then(|ours| compared(&ours, row));
@@ -164,16 +164,17 @@ impl<'a> ProtocolTable<'a> {
         let spreads: Vec<Option<Spread>> = (0..columns.len())
             .map(|column| Spread::of(measured.iter().map(|(_, values)| values[column])))
             .collect();
+        let digits = metric.decimals;
         let mut add = |kind: &str, text: &dyn Fn(&Spread) -> String| {
             let spreads = spreads.iter().map(Option::as_ref);
             let cells = spreads.map(|spread| spread.map_or(ABSENT.into(), text));
             lines.push((kind.into(), cells.collect()));
         };
         add("ours, mean ± sd", &|it| {
-            format!("{:.2} ± {:.2}", it.mean, it.deviation)
+            format!("{:.digits$} ± {:.digits$}", it.mean, it.deviation)
         });
         add("ours, min to max", &|it| {
-            format!("{:.2} to {:.2}", it.least, it.most)
+            format!("{:.digits$} to {:.digits$}", it.least, it.most)
         });
         if paper.is_some() {
             let means = spreads.iter().map(|spread| Some(spread.as_ref()?.mean));
@@ -209,12 +210,19 @@ impl<'a> ProtocolTable<'a> {
             out += &line(&block_title(metric), &header);
             for (row, scores) in &measured {
                 let ours = our_values(scores.row(metric.key), columns);
-                out += &line(&row.name, &cells(&ours, false));
+                out += &line(&row.name, &cells(&ours, metric));
                 let paper = self.printed.row(&row.name).filter(|_| self.is_compared());
-                let paper = paper.and_then(|paper| paper.values.get(metric.key));
-                if let Some(values) = paper.filter(|_| *columns == self.printed.columns) {
-                    let values: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
-                    out += &line("  paper", &cells(&values, false));
+                let paper = paper.filter(|paper| paper.values.contains_key(metric.key));
+                let known = &self.printed.columns;
+                // A mean over other lengths is not the paper's.
+                let all = known.iter().all(|column| columns.contains(column));
+                if let Some(paper) = paper.filter(|_| all) {
+                    let value = |column: &String| match column == AVERAGE && columns != known {
+                        true => None,
+                        false => paper.value(metric.key, known, column),
+                    };
+                    let values: Vec<Option<f64>> = columns.iter().map(value).collect();
+                    out += &line("  paper", &cells(&values, metric));
                 }
             }
             out.push('\n');
@@ -350,11 +358,20 @@ fn our_values(row: Option<&ScoreRow>, columns: &[String]) -> Vec<Option<f64>> {
     columns.iter().map(value).collect()
 }
 
-fn cells(values: &[Option<f64>], signed: bool) -> Vec<String> {
-    let text = |value: &Option<f64>| match value {
-        None => "-".to_string(),
-        Some(value) if signed => format!("{value:+.2}"),
-        Some(value) => format!("{value:.2}"),
-    };
-    values.iter().map(text).collect()
+fn cells(values: &[Option<f64>], metric: &Metric) -> Vec<String> {
+    let digits = metric.decimals;
+    let text = |value: f64| format!("{value:.digits$}");
+    values
+        .iter()
+        .map(|it| it.map_or("-".into(), text))
+        .collect()
+}
+
+fn signed_cells(values: &[Option<f64>], metric: &Metric) -> Vec<String> {
+    let digits = metric.decimals;
+    let text = |value: f64| format!("{value:+.digits$}");
+    values
+        .iter()
+        .map(|it| it.map_or("-".into(), text))
+        .collect()
 }

@@ -354,6 +354,7 @@ const METRICS: [Metric; 2] = [
         title: "NLL",
         unit: "nats a frame",
         better: Better::Lower,
+        decimals: 2,
         about: "negative logarithm of the likelihood of a frame",
     },
     Metric {
@@ -361,6 +362,7 @@ const METRICS: [Metric; 2] = [
         title: "spread",
         unit: "cm",
         better: Better::Higher,
+        decimals: 2,
         about: "standard deviation of the raw output",
     },
 ];

@@ -18,6 +18,7 @@ const METRICS: [Metric; 4] = [
         title: "LRP",
         unit: "cm",
         better: Better::Lower,
+        decimals: 2,
         about: "average L2 distance of root-relative positions (eq. 12), cm",
     },
     Metric {
@@ -25,6 +26,7 @@ const METRICS: [Metric; 4] = [
         title: "AVF",
         unit: "share of windows",
         better: Better::Higher,
+        decimals: 2,
         about: "share of windows with the velocity factors asked for (eq. 13 and 14)",
     },
     Metric {
@@ -32,6 +34,7 @@ const METRICS: [Metric; 4] = [
         title: "ART",
         unit: "share of windows",
         better: Better::Higher,
+        decimals: 2,
         about: "share of windows on the root trajectory asked for (eq. 15 and 16)",
     },
     Metric {
@@ -39,6 +42,7 @@ const METRICS: [Metric; 4] = [
         title: "foot skate",
         unit: "cm/frame",
         better: Better::Lower,
+        decimals: 2,
         about: "how far a foot joint moves in a frame in which the recorded one is in contact, cm/frame",
     },
 ];

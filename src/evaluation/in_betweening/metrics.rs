@@ -14,6 +14,7 @@ const fn lower(
         title,
         unit,
         better: Better::Lower,
+        decimals: 2,
         about,
     }
 }
@@ -47,19 +48,25 @@ pub(super) const METRICS: [Metric; 12] = [
         "standard deviations",
         "the same of positions in the world",
     ),
-    lower(
-        "npss_local",
-        "NPSS, local",
-        "distance of spectra",
-        "normalised power spectrum similarity of local quaternions, weights shared over all \
-         windows",
-    ),
-    lower(
-        "npss_global",
-        "NPSS, global",
-        "distance of spectra",
-        "the same of quaternions in the world",
-    ),
+    Metric {
+        decimals: 4,
+        ..lower(
+            "npss_local",
+            "NPSS, local",
+            "distance of spectra",
+            "normalised power spectrum similarity of local quaternions, weights shared over all \
+             windows",
+        )
+    },
+    Metric {
+        decimals: 4,
+        ..lower(
+            "npss_global",
+            "NPSS, global",
+            "distance of spectra",
+            "the same of quaternions in the world",
+        )
+    },
     lower(
         "root_error",
         "root error",

@@ -21,7 +21,7 @@ use super::{Metric, Scores};
 use crate::data::{DataConfig, DataPart, Dataset, Recording, Window, WindowCut};
 use crate::models::Generator;
 use crate::models::generator::{Needs, Request};
-use crate::motion::{Clip, ContactRule, FeatureConfig, Skeleton};
+use crate::motion::{Clip, FeatureConfig, Skeleton};
 use answer::Answer;
 use data_set::DataSet;
 use recorded::{RecordedClip, RecordedWindow};
@@ -48,6 +48,10 @@ pub use npss::Npss;
 /// Sigma of L2P is taken over all windows of 50 frames of the training clips, those that are set
 /// aside for validation included, so that it is the same whatever the share.
 ///
+/// Contacts are labelled by the rule of the model that is asked: the lower ankle, unless it was
+/// trained on others. They are given to it where it reads them, and the root that it is compared
+/// with is reconstructed from them.
+///
 /// Clips may be on any skeleton that has the joints that feet and facing are told by, all on one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBetweening {
@@ -55,7 +59,6 @@ pub struct InBetweening {
     lengths: Vec<usize>,
     most_windows: Option<usize>,
     features: FeatureConfig,
-    contacts: ContactRule,
 }
 
 impl InBetweening {
@@ -77,16 +80,8 @@ impl InBetweening {
             },
             most_windows: options.most_windows,
             features: data.features(),
-            contacts: ContactRule::default(),
             set,
         }
-    }
-
-    /// The same with other contact labels, for a model that was trained on such: they are given to
-    /// it, and the reconstructed root follows them. Without this it is the lower ankle.
-    #[must_use]
-    pub fn with_contacts(self, contacts: ContactRule) -> Self {
-        Self { contacts, ..self }
     }
 
     /// How the windows that are scored are cut from the clips.
@@ -146,12 +141,13 @@ impl InBetweening {
         deviations: &Deviations,
         length: usize,
     ) -> Result<Vec<Sums>, EvaluationError> {
-        let (needs, span) = (model.needs(), self.set.span(length));
+        let (needs, rule) = (model.needs(), model.contact_rule());
+        let span = self.set.span(length);
         let threshold = self.features.contact_threshold;
         let windows: Vec<RecordedWindow> = windows
             .iter()
             .map(|&Window { clip, start }| {
-                clips[clip].window(&self.set, start, span, self.contacts, threshold)
+                clips[clip].window(&self.set, start, span, rule, threshold)
             })
             .collect();
         let requests = windows.iter().map(|window| window.request(&needs));
@@ -167,13 +163,7 @@ impl InBetweening {
             .map(|(window, (request, motion))| {
                 let answer = Answer::of(request, motion);
                 let answer = answer.map_err(|source| failed(model, &name(window), source))?;
-                Ok(Sums::of(
-                    window,
-                    &answer,
-                    deviations,
-                    self.contacts,
-                    threshold,
-                ))
+                Ok(Sums::of(window, &answer, deviations, rule, threshold))
             })
             .collect()
     }

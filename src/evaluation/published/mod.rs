@@ -18,6 +18,7 @@ const METRICS: [Metric; 3] = [
         title: "LRP",
         unit: "cm",
         better: Better::Lower,
+        decimals: 2,
         about: "average L2 distance of root-relative positions and the root, both keyframes counted, cm",
     },
     Metric {
@@ -25,6 +26,7 @@ const METRICS: [Metric; 3] = [
         title: "AVF",
         unit: "share of velocity factors",
         better: Better::Higher,
+        decimals: 2,
         about: "share of single velocity factors (frame and body part) that are met",
     },
     Metric {
@@ -32,6 +34,7 @@ const METRICS: [Metric; 3] = [
         title: "ART",
         unit: "share of frames",
         better: Better::Higher,
+        decimals: 2,
         about: "share of single frames on the root trajectory asked for",
     },
 ];

@@ -87,6 +87,18 @@ pub struct LossConfig {
     pub root: f64,
     /// What L_p and L_r are measured in.
     pub unit: LossUnit,
+    /// What of the differences of a frame L_rec is a mean of.
+    pub reconstruction: Reconstruction,
+}
+
+/// What of the differences of a frame L_rec is a mean of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reconstruction {
+    /// Their mean square, as the paper's text and the authors' program have it.
+    MeanSquare,
+    /// Their norm, as eq. 17 is printed; it is what L2Q measures.
+    Norm,
 }
 
 /// What L_p and L_r are measured in.
@@ -163,6 +175,7 @@ impl Default for LossConfig {
             position: 1e-5,
             root: 1e-5,
             unit: LossUnit::Cm,
+            reconstruction: Reconstruction::MeanSquare,
         }
     }
 }

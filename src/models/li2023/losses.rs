@@ -1,7 +1,7 @@
 //! Eq. 17 to 21.
 
 use super::network::Output;
-use super::{Li2023, RootWeights, reconstruct_root};
+use super::{Li2023, Reconstruction, RootWeights, reconstruct_root};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::LossTerms;
 use crate::models::rotations::Batch;
@@ -11,7 +11,7 @@ const SMALLEST_SQUARE: f64 = 1e-12;
 
 /// The losses of an output, means over the step's windows, their frames and numbers:
 ///
-/// - L_rec (eq. 17): squared differences of Y and Q;
+/// - L_rec (eq. 17): squared differences of Y and Q, or the norm of a frame's;
 /// - L_con (eq. 18): both components of the label, for a softmax twice the cross-entropy;
 /// - L_p (eq. 19): squared differences of P, positions relative to the root, cm^2;
 /// - L_r (eq. 20): squared differences of the reconstructed roots, both from R_1, cm^2.
@@ -32,7 +32,15 @@ pub fn losses<T: Real>(
     // A shard's share of the mean over all windows of the step.
     let frames = (batch.total_windows * batch.frames) as f64;
     let rotations = tape.constant(truth.rotations.clone());
-    let reconstruction = mean_square(tape, output.rotations, rotations, frames)?;
+    let reconstruction = match weights.reconstruction {
+        Reconstruction::MeanSquare => mean_square(tape, output.rotations, rotations, frames)?,
+        Reconstruction::Norm => {
+            let difference = tape.sub(output.rotations, rotations)?;
+            let norms = tape.vector_norm(difference, SMALLEST_SQUARE)?;
+            let sum = tape.sum(norms);
+            tape.affine(sum, 1.0 / frames, 0.0)
+        }
+    };
     let mut terms = vec![("rec", 1.0, reconstruction)];
     let labels = tape.constant(batch.contacts.clone());
     if weights.contact > 0.0 {

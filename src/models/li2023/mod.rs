@@ -14,8 +14,8 @@ mod network;
 mod root;
 
 pub use config::{
-    ContactConfig, Input, Li2023Config, Li2023Settings, LossConfig, LossUnit, RootConfig,
-    RootWeights, StateDecoder, TargetMeeting,
+    ContactConfig, Input, Li2023Config, Li2023Settings, LossConfig, LossUnit, Reconstruction,
+    RootConfig, RootWeights, StateDecoder, TargetMeeting,
 };
 pub use losses::losses;
 pub use network::{Li2023, Output};
@@ -23,6 +23,7 @@ pub use root::reconstruct_root;
 
 use toml::Table;
 
+use crate::evaluation::in_betweening::InBetweening;
 use crate::models::settings::{ModelKind, ModelSettings, Paper};
 
 /// The line of the registry.
@@ -57,7 +58,7 @@ pub const DANCE: Paper = Paper {
     name: "li2023",
     printed: include_str!("../../../experiments/li2023/paper.toml"),
     figures: None,
-    protocols: |_, _| Vec::new(),
+    protocols: |data, options| vec![Box::new(InBetweening::dance(data, options))],
 };
 
 /// The paper's tables on LaFAN1.
@@ -65,5 +66,5 @@ pub const LAFAN1: Paper = Paper {
     name: "li2023_lafan1",
     printed: include_str!("../../../experiments/li2023_lafan1/paper.toml"),
     figures: None,
-    protocols: |_, _| Vec::new(),
+    protocols: |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
 };

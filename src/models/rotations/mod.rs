@@ -26,7 +26,7 @@ pub use body::Body;
 pub use clips::{AugmentationConfig, TrainingClip};
 pub use gradient_check::generated_batch;
 pub use network::{Prediction, RootSource, RotationNetwork};
-pub use schedule::{LengthConfig, Schedule, ScheduleConfig, windows_of};
+pub use schedule::{LengthConfig, Schedule, ScheduleConfig};
 pub use settings::RotationSettings;
 pub use statistics::WindowStatistics;
 pub use task::RotationTask;

@@ -5,9 +5,9 @@ use rand::RngExt as _;
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
+use crate::data::{Window, WindowCut};
 use crate::models::settings::ValueError;
 use crate::models::streams::Streams;
-use crate::models::transition::Window;
 
 /// Longest window that a config may name, frames.
 const LONGEST: usize = 10_000;
@@ -97,6 +97,15 @@ impl ScheduleConfig {
         ValueError::unless(some, "schedule.frame_steps", 0, "at least 1")
     }
 
+    /// How the training windows are cut from the clips.
+    pub fn cut(&self) -> WindowCut {
+        WindowCut {
+            frames: self.window,
+            every: self.offset,
+            strictly: !self.last_frame,
+        }
+    }
+
     /// How much of the schedule is trained, for the caption of a table.
     pub fn budget(&self) -> String {
         let share = match self.frame_steps {
@@ -109,22 +118,6 @@ impl ScheduleConfig {
             self.batch_size
         )
     }
-}
-
-/// Starts of the windows of clips with these numbers of frames.
-pub fn windows_of(clip_frames: &[usize], config: &ScheduleConfig) -> Vec<Window> {
-    let spare = usize::from(!config.last_frame);
-    let starts = |frames: usize| match frames.checked_sub(config.window + spare) {
-        Some(last) => (0..=last).step_by(config.offset).collect(),
-        None => Vec::new(),
-    };
-    let clips = clip_frames.iter().enumerate();
-    clips
-        .flat_map(|(clip, &frames)| {
-            let starts: Vec<usize> = starts(frames);
-            starts.into_iter().map(move |start| Window { clip, start })
-        })
-        .collect()
 }
 
 /// The steps of a training, counted; a step's windows are drawn when it is their turn.
@@ -149,7 +142,7 @@ pub struct BatchPlan {
 
 impl Schedule {
     pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
-        let windows = windows_of(clip_frames, config);
+        let windows = config.cut().windows(clip_frames);
         let mut schedule = Self {
             whole_steps: windows.len().div_ceil(config.batch_size) as u64 * config.epochs,
             windows,

@@ -56,7 +56,7 @@ impl RotationTask {
                 reason: format!(
                     "no training clip has the {} frames of a window (schedule.window), the longest \
                      of {} has {longest}",
-                    config.window + usize::from(!config.last_frame),
+                    config.cut().needed(),
                     counted(frames.len(), "clip"),
                 ),
             });
