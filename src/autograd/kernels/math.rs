@@ -22,7 +22,9 @@ fn power_of_two(n: i32) -> f32 {
 pub fn exp(x: f32) -> f32 {
     // Beyond these bounds the result is 0 or infinite. Comparisons that are false for NaN keep it.
     let x = if x > 89.0 { 89.0 } else { x };
-    let x = if x < -104.0 { -104.0 } else { x };
+    // Not left to the product at the end: one that underflows takes a hundred cycles.
+    let vanishes = x < -104.0;
+    let x = if vanishes { 0.0 } else { x };
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
     let n = (shifted.to_bits() as i32).wrapping_sub(ROUND.to_bits() as i32);
     let whole = shifted - ROUND;
@@ -37,7 +39,8 @@ pub fn exp(x: f32) -> f32 {
     let p = p * (r * r) + r + 1.0;
     // Two factors, as 2^n alone leaves the exponent's range at both ends.
     let half = n >> 1;
-    p * power_of_two(half) * power_of_two(n.wrapping_sub(half))
+    let y = p * power_of_two(half) * power_of_two(n.wrapping_sub(half));
+    if vanishes { 0.0 } else { y }
 }
 
 /// Hyperbolic tangent.

@@ -11,7 +11,10 @@ use super::Real;
 pub const CHUNK: usize = 8;
 /// Rows whose sums are made side by side.
 const ROWS: usize = 4;
-/// Numbers of a row that are summed at once.
+/// Rows of scores that are in the first-level cache between the passes of their softmax.
+const SOFTMAX_ROWS: usize = 32;
+/// Numbers of a row that are summed at once, for narrow rows and for others.
+const NARROW: usize = 4;
 const LANES: usize = 16;
 
 /// Rows of a matrix, or columns of them: row r begins at `start + r * stride`.
@@ -99,18 +102,38 @@ pub fn window_scores<T: Real>(
     }
 }
 
-/// The weights of a sum over rows: that of row j for result i is `values[i * result + j * row]`.
+/// The weights of a sum over rows, in padded rows of scores.
 #[derive(Clone, Copy)]
 pub struct WindowWeights<'w, T> {
     pub values: &'w [T],
-    pub result: usize,
-    pub row: usize,
+    /// Length of a padded row.
+    pub padded: usize,
+    /// Whether a sum has a column of weights, else a row of them: that of row j for result i is at
+    /// `j * padded + i`, else at `i * padded + j`.
+    pub columns: bool,
 }
 
 /// out_i (+)= sum_j weight(i, j) x_j, i below `results`, j below `rows`; rows of `out` begin
 /// `stride` apart.
 #[inline(always)]
 pub fn window_sums<T: Real>(
+    out: (&mut [T], usize, usize),
+    weights: WindowWeights<'_, T>,
+    x: (WindowRows<'_, T>, usize),
+    width: usize,
+    accumulate: bool,
+    scratch: &mut [T],
+) {
+    if width <= NARROW {
+        sums_of_lanes::<T, NARROW>(out, weights, x, width, accumulate, scratch);
+    } else {
+        sums_of_lanes::<T, LANES>(out, weights, x, width, accumulate, scratch);
+    }
+}
+
+/// [`window_sums`], `LANES` columns at once.
+#[inline(always)]
+fn sums_of_lanes<T: Real, const LANES: usize>(
     (out, stride, results): (&mut [T], usize, usize),
     weights: WindowWeights<'_, T>,
     (x, rows): (WindowRows<'_, T>, usize),
@@ -135,43 +158,65 @@ pub fn window_sums<T: Real>(
             stride: wide,
         }
     };
+    let WindowWeights {
+        values,
+        padded,
+        columns,
+    } = weights;
     for first in (0..results).step_by(ROWS) {
         let here = (results - first).min(ROWS);
-        // Beyond the last result it is computed again, and not stored.
-        let weights_of: [&[T]; ROWS] = std::array::from_fn(|r| {
-            &weights.values[(first + r).min(results - 1) * weights.result..]
+        // Beyond the last result sums are made, too, and not stored: of its weights again, or of
+        // those in the padding, which is a multiple of ROWS.
+        let row_of: [&[T]; ROWS] = std::array::from_fn(|r| match columns {
+            true => &[],
+            false => &values[(first + r).min(results - 1) * padded..][..rows],
         });
         for column in (0..width).step_by(LANES) {
             let n = (width - column).min(LANES);
             let mut edges = [[T::zero(); LANES]; ROWS];
             if accumulate {
                 for (r, edge) in edges.iter_mut().enumerate().take(here) {
-                    copy(&mut edge[..n], &out[(first + r) * stride + column..][..n]);
+                    copy::<T, LANES>(&mut edge[..n], &out[(first + r) * stride + column..][..n]);
                 }
             }
-            // Sums of their own, as the compiler keeps no array in registers that is cut at a place
-            // it does not know.
-            let mut sums = edges;
-            for j in 0..rows {
-                let x = &x.row(j, wide)[column..column + LANES];
-                for r in 0..ROWS {
-                    let weight = weights_of[r][j * weights.row];
-                    for lane in 0..LANES {
-                        sums[r][lane] += weight * x[lane];
-                    }
-                }
-            }
-            edges = sums;
+            let x = |j| &x.row(j, wide)[column..column + LANES];
+            edges = if columns {
+                let weights = |j: usize, r: usize| values[j * padded + first..][..ROWS][r];
+                add_up(edges, rows, weights, x)
+            } else {
+                add_up(edges, rows, |j, r| row_of[r][j], x)
+            };
             for (r, edge) in edges.iter().enumerate().take(here) {
-                copy(&mut out[(first + r) * stride + column..][..n], &edge[..n]);
+                copy::<T, LANES>(&mut out[(first + r) * stride + column..][..n], &edge[..n]);
             }
         }
     }
 }
 
+/// sums_r + sum_j weight(j, r) x_j, j below `rows`. The sums are this function's own, as the
+/// compiler keeps no array in registers that is cut at a place it does not know.
+#[inline(always)]
+fn add_up<'x, T: Real, const LANES: usize>(
+    mut sums: [[T; LANES]; ROWS],
+    rows: usize,
+    weight: impl Fn(usize, usize) -> T,
+    x: impl Fn(usize) -> &'x [T],
+) -> [[T; LANES]; ROWS] {
+    for j in 0..rows {
+        let x = x(j);
+        for (r, sums) in sums.iter_mut().enumerate() {
+            let weight = weight(j, r);
+            for lane in 0..LANES {
+                sums[lane] += weight * x[lane];
+            }
+        }
+    }
+    sums
+}
+
 /// Copies slices of one length; a whole vector without a call.
 #[inline(always)]
-fn copy<T: Real>(to: &mut [T], from: &[T]) {
+fn copy<T: Real, const LANES: usize>(to: &mut [T], from: &[T]) {
     match (
         <&mut [T; LANES]>::try_from(&mut *to),
         <&[T; LANES]>::try_from(from),
@@ -194,24 +239,32 @@ pub fn window_softmax<T: Real>(rows: &mut [T], keys: usize) {
     let padded = keys.next_multiple_of(CHUNK);
     // A NaN need not win here: its own exponential puts it into the sum.
     let max = |a: T, b: T| if a > b { a } else { b };
-    for row in rows.chunks_exact_mut(padded) {
-        row[keys..].fill(T::neg_infinity());
-        let mut lanes = [T::neg_infinity(); CHUNK];
-        for chunk in row.chunks_exact(CHUNK) {
-            for (lane, &x) in lanes.iter_mut().zip(chunk) {
-                *lane = max(*lane, x);
+    // Pass by pass over a few rows, so that the exponentials do not wait for each row's maximum.
+    for block in rows.chunks_mut(padded * SOFTMAX_ROWS) {
+        for row in block.chunks_exact_mut(padded) {
+            row[keys..].fill(T::neg_infinity());
+            let mut lanes = [T::neg_infinity(); CHUNK];
+            for chunk in row.chunks_exact(CHUNK) {
+                for (lane, &x) in lanes.iter_mut().zip(chunk) {
+                    *lane = max(*lane, x);
+                }
             }
+            let top = fold(lanes, max);
+            row.iter_mut().for_each(|x| *x -= top);
         }
-        let top = fold(lanes, max);
-        let mut lanes = [T::zero(); CHUNK];
-        for chunk in row.chunks_exact_mut(CHUNK) {
-            for (lane, x) in lanes.iter_mut().zip(chunk) {
-                *x = (*x - top).exp_lane();
-                *lane += *x;
+        for x in &mut *block {
+            *x = x.exp_lane();
+        }
+        for row in block.chunks_exact_mut(padded) {
+            let mut lanes = [T::zero(); CHUNK];
+            for chunk in row.chunks_exact(CHUNK) {
+                for (lane, &x) in lanes.iter_mut().zip(chunk) {
+                    *lane += x;
+                }
             }
+            let inverse = T::one() / fold(lanes, |a, b| a + b);
+            row.iter_mut().for_each(|x| *x *= inverse);
         }
-        let inverse = T::one() / fold(lanes, |a, b| a + b);
-        row.iter_mut().for_each(|x| *x *= inverse);
     }
 }
 

@@ -51,10 +51,10 @@ impl<T: Real> Sums<'_, T> {
         scratch: &mut [T],
     ) {
         let (width, padded) = (shape.head_width(), shape.padded_keys());
-        let (results, others, result, row) = if self.for_keys {
-            (shape.keys, shape.queries, 1, padded)
+        let (results, others) = if self.for_keys {
+            (shape.keys, shape.queries)
         } else {
-            (shape.queries, shape.keys, padded, 1)
+            (shape.queries, shape.keys)
         };
         vectorised(
             #[inline(always)]
@@ -65,8 +65,8 @@ impl<T: Real> Sums<'_, T> {
                     let x = self.rows.from(window * others, column);
                     let weights = WindowWeights {
                         values,
-                        result,
-                        row,
+                        padded,
+                        columns: self.for_keys,
                     };
                     let out = (&mut out[from..], stride, results);
                     window_sums(out, weights, (x, others), width, accumulate, scratch);
