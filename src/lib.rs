@@ -16,8 +16,16 @@
 //! ```
 //!
 //! `examples/` has an MLP with Adam on a sine, an LSTM, attention, an operation of one's own, BVH
-//! in and out, and a model used from code. A crate that needs no command line depends on keydance
-//! with `default-features = false, features = ["papers"]`, or on the engine alone without any.
+//! in and out, and a model used from code. A crate that needs no command line depends on a clone:
+//!
+//! ```toml
+//! [dependencies] # without "papers": the engine alone
+//! keydance = { path = "../keydance", default-features = false, features = ["papers"] }
+//! rand_chacha = "0.10" # a generator for `Initialiser`; ndarray and rand are re-exported
+//!
+//! [dev-dependencies] # for `autograd::check::property`
+//! keydance = { path = "../keydance", default-features = false, features = ["proptest"] }
+//! ```
 //!
 //! The modules in reading order, the path of the data:
 //!

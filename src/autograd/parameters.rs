@@ -267,7 +267,8 @@ impl<T: Real> Parameters<T> {
 }
 
 fn foreign(operation: &'static str) -> AutogradError {
-    let what = "what is asked for belongs to other parameters";
+    let what = "what is asked for belongs to other parameters: an id is one of the Parameters \
+                that gave it, and of their clones";
     AutogradError::Misplaced { operation, what }
 }
 

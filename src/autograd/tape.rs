@@ -41,6 +41,24 @@ fn new_stamp() -> u32 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
+macro_rules! elsewhere {
+    ($operand:literal) => {
+        concat!(
+            $operand,
+            " is not on this tape: it was made on another, or is forgotten; make it on this one, ",
+            "or give its numbers to Tape::constant"
+        )
+    };
+}
+
+/// What is said of an operand that is not on the tape, by its place.
+const ELSEWHERE: [&str; 4] = [
+    elsewhere!("its first operand"),
+    elsewhere!("its second operand"),
+    elsewhere!("its third operand"),
+    elsewhere!("a later operand"),
+];
+
 /// What a recorded operation knows for its way back.
 pub trait Operation<T: Real>: Send {
     /// Adds to the gradients of the inputs what follows from `dy`, the gradient of the output (in
@@ -90,6 +108,8 @@ pub(super) struct Lists<T: Real> {
 
 /// A tape. Operations are methods, one file each in [`super::ops`]; the values stay until the tape
 /// ends or [`Tape::forget_since`].
+///
+/// Each method borrows the tape: name what it gives, `let y = ..`, before the next takes it.
 ///
 /// A method that returns no `Result` and is asked for what it cannot do gives a value of no tape:
 /// whatever is then asked of that, the way back included, fails with the reason, and there is
@@ -296,11 +316,11 @@ impl<'a, T: Real> Tape<'a, T> {
 
     /// Refuses operands that are not on this tape: each operation begins with it.
     pub(super) fn own(&self, operation: &'static str, vars: &[Var]) -> Result<(), AutogradError> {
-        match vars.iter().find(|&&var| !self.has(var)) {
+        match vars.iter().position(|&var| !self.has(var)) {
             None => Ok(()),
-            Some(&var) => {
-                let what = "a value is not on this tape: it was made on another, or is forgotten";
-                let refused = self.refused.clone().filter(|_| var == Var::NONE);
+            Some(place) => {
+                let what = ELSEWHERE[place.min(ELSEWHERE.len() - 1)];
+                let refused = self.refused.clone().filter(|_| vars[place] == Var::NONE);
                 Err(refused.unwrap_or(AutogradError::Misplaced { operation, what }))
             }
         }

@@ -1,5 +1,26 @@
 //! What may be asked of a model, trained or not: a [`Request`] says what is given, a [`Generator`]
 //! makes a [`Motion`] of it.
+//!
+//! ```
+//! # #[cfg(feature = "papers")] {
+//! use keydance::data::choreography::{ChoreographyConfig, generate};
+//! use keydance::evaluation::transitions::window_request;
+//! use keydance::models::{Generator as _, baselines::interpolation::Interpolation};
+//! use keydance::motion::{FeatureConfig, features};
+//! use ndarray::s;
+//!
+//! let dance = ChoreographyConfig { clips: 1, frames_per_clip: 60, seed: 1 };
+//! let clip = generate(&dance)?.remove(0).clip;
+//! // The poses of frames 0 and 30, and between them where the root is and how fast the body moves.
+//! let recorded = features(&clip, &FeatureConfig::default())?;
+//! let request = window_request(&clip, 0, recorded.slice(s![..=30, ..])).ok_or("too short")?;
+//! let motion = Interpolation::default().generate(&[request])?.remove(0);
+//! assert_eq!(motion.positions.shape(), [31, 24, 3]); // frames, joints, cm in the world
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A trained model: [`Subject::open`](crate::run::Subject::open) on its run's folder.
 
 use std::ops::Range;
 

@@ -138,10 +138,14 @@ pub enum AdamError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     #[error(
-        "the weights or gradients are those of other parameters than the optimiser was made for"
+        "Adam: the weights or gradients are those of other parameters than the optimiser was made \
+         for: make it and Gradients::zeros once all parameters are added"
     )]
     OtherParameters,
-    #[error("the gradient of {parameter} {shape:?} holds a NaN or an infinity")]
+    #[error(
+        "the gradient of {parameter} {shape:?} holds a NaN or an infinity: Tape::with_trace names \
+         the operation that made it"
+    )]
     NonFinite {
         parameter: String,
         shape: Vec<usize>,

@@ -14,7 +14,20 @@
 //!         tape.add(square, x)
 //!     }),
 //! );
+//!
+//! // Two operands of one shape, whose numbers keep 0.1 from the kink at 0.
+//! property::check(
+//!     "|x| y",
+//!     property::drawn(property::shapes(), |shape, seed| {
+//!         property::case(&[&shape, &shape], seed, 0.1, |tape, v| {
+//!             let x = tape.abs(v[0]);
+//!             tape.mul(x, v[1])
+//!         })
+//!     }),
+//! );
 //! ```
+//!
+//! [`drawn`] takes whatever proptest draws, such as `(1usize..5, 1usize..5)` for sizes.
 
 use std::fmt;
 use std::sync::Arc;
@@ -139,8 +152,15 @@ pub(super) fn check_case(case: &Case) -> Result<(), TestCaseError> {
             ] {
                 let found = compare(analytic, 1.0, centre, &mut at).map_err(fails)?;
                 // None at a kink: the gradient is that of one side.
-                let agrees = found.as_ref().is_none_or(|found| found.error <= 2e-7);
-                prop_assert!(agrees, "input {i} as {how}, number {k}: {found:?}");
+                let Some(found) = found.filter(|found| found.error > 2e-7) else {
+                    continue;
+                };
+                let (of, shape) = (found.analytic, input.shape());
+                let numeric = found.numeric;
+                return Err(TestCaseError::fail(format!(
+                    "the gradient of number {k} of input {i} {shape:?}, given as a {how}, is {of}, \
+                     by central differences {numeric}"
+                )));
             }
         }
     }

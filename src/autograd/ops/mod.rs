@@ -158,6 +158,9 @@ mod gradient_is_that_of_central_differences {
             .filter(|name| !OTHERS.contains(&name.as_str()))
             .collect();
         files.sort();
-        assert_eq!(files, OPERATIONS);
+        assert_eq!(
+            files, OPERATIONS,
+            "each file of src/autograd/ops has a `gradient` module and its name in operations!"
+        );
     }
 }

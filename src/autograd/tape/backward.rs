@@ -25,7 +25,7 @@ impl<T: Real> Tape<'_, T> {
                 operation: "backward",
                 shape: self.known().shape(loss).to_vec(),
                 argument: "the loss".into(),
-                expected: "one number",
+                expected: "one number: take the mean or the sum first",
             });
         }
         self.backward_from(loss, &[T::one()], &[], gradients)
@@ -148,8 +148,11 @@ impl<T: Real> Tape<'_, T> {
         self.own(operation, values)?;
         if !self.recording || !gradients.fit(self.parameters) {
             let what = match self.recording {
-                true => "the gradients are those of other parameters than the tape's",
-                false => "the tape does not record",
+                true => {
+                    "the gradients are those of other parameters than the tape's: make them by \
+                     Gradients::zeros once all parameters are added"
+                }
+                false => "the tape does not record: make it by Tape::recording",
             };
             return Err(AutogradError::Misplaced { operation, what });
         }
