@@ -40,6 +40,9 @@ struct Layer {
     table: Table,
     /// The files that say so.
     files: Vec<PathBuf>,
+    /// Whether it is over models of every kind, as a budget is: its tables that belong to other
+    /// kinds are left out.
+    any_model: bool,
 }
 
 impl Layer {
@@ -73,6 +76,7 @@ impl Layer {
             origin,
             table,
             files,
+            any_model: false,
         })
     }
 }
@@ -101,8 +105,13 @@ impl ExperimentConfig {
         sets: &[String],
     ) -> Result<Self, ConfigError> {
         let mut layers = Vec::new();
-        for file in [Some(path), budget].into_iter().flatten() {
-            read_layers(file, &mut Vec::new(), &mut layers)?;
+        read_layers(path, &mut Vec::new(), &mut layers)?;
+        if let Some(budget) = budget {
+            let own = layers.len();
+            read_layers(budget, &mut Vec::new(), &mut layers)?;
+            layers[own..]
+                .iter_mut()
+                .for_each(|layer| layer.any_model = true);
         }
         for set in sets {
             layers.push(set_layer(set)?);
@@ -294,6 +303,7 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
     for Layer {
         origin,
         table: above,
+        any_model,
         ..
     } in layers
     {
@@ -306,6 +316,12 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
             kind = other;
         }
         let mut above = above.clone();
+        if *any_model {
+            let known = kind.defaults();
+            let others = registry::kinds();
+            let of_others = |key: &str| others.iter().any(|it| it.defaults().contains_key(key));
+            above.retain(|key, _| known.contains_key(key) || !of_others(key));
+        }
         kind.rename_former_keys(&mut above);
         merge(&mut table, &above, "");
         read = Some(parse_layer(&table, &*kind, origin)?);

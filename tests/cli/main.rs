@@ -33,5 +33,6 @@ mod odd_files;
 mod outputs;
 mod report;
 mod reproduce;
+mod rotations;
 mod stopped;
 mod viewer;

@@ -78,6 +78,22 @@ fn a_budget_overrides_the_file_and_the_command_line_both() {
 }
 
 #[test]
+fn a_budget_is_over_models_of_any_kind_but_the_command_line_over_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, budget) = (folder.path().join("a.toml"), folder.path().join("b.toml"));
+    fs::write(&config, "model.kind = 'slerp'").unwrap();
+    fs::write(&budget, "seed = 4\nschedule.fraction = 0.5").unwrap();
+    let read = ExperimentConfig::load_under(&config, Some(&budget), &[]).unwrap();
+    assert_eq!(read.seed, 4);
+    let set = "schedule.fraction=0.5".to_string();
+    let error = ExperimentConfig::load_under(&config, None, &[set]).unwrap_err();
+    assert!(error.to_string().contains("schedule"), "{error}");
+    fs::write(&budget, "scedule.fraction = 0.5").unwrap();
+    let error = ExperimentConfig::load_under(&config, Some(&budget), &[]).unwrap_err();
+    assert!(error.to_string().contains("scedule"), "{error}");
+}
+
+#[test]
 fn what_a_budget_says_of_transformers_is_left_out_for_a_model_without_them() {
     let rate = "optimiser.transformer_learning_rate=2e-4";
     let of = |model: &str, sets: &[&str]| load(&[("a.toml", model)], sets).unwrap();

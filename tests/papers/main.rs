@@ -31,6 +31,7 @@ mod prior;
 mod published;
 mod ranges;
 mod root_frame;
+mod rotations;
 mod schedule;
 mod step_batches;
 mod synthesis;
