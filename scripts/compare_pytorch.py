@@ -2,7 +2,7 @@
 """Compares keydance with a PyTorch version of its model: numbers, gradients and speed.
 
     compare_pytorch.py check --weights W.safetensors --batch B.safetensors
-    compare_pytorch.py time [--keydance BINARY]
+    compare_pytorch.py time [--model pan2021 | li2023] [--keydance BINARY]
     compare_pytorch.py selftest
 
 Needs the packages of scripts/pytorch_reference/requirements.txt.
@@ -15,7 +15,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent / "pytorch_reference"))
 
 import checks  # noqa: E402
+import li2023_checks  # noqa: E402
+import li2023_timing  # noqa: E402
 import timing  # noqa: E402
+
+SIZES = {"pan2021": ([5, 30, 60], 128), "li2023": ([50], 12)}
+LI2023 = Path(__file__).resolve().parent.parent / "experiments" / "li2023" / "ours.toml"
 
 
 def main():
@@ -28,13 +33,18 @@ def main():
         "--batch", type=Path, required=True, help="safetensors: window and our results"
     )
     check.add_argument(
-        "--tolerance", type=float, default=1e-4, help="relative, of a tensor's largest"
+        "--tolerance",
+        type=float,
+        help="relative, of a tensor's largest [default: 1e-4; 1e-9 for a batch in f64]",
     )
 
     time = commands.add_parser("time", help="training steps and generation, in turn")
+    time.add_argument("--model", choices=SIZES, default="pan2021")
+    time.add_argument("--config", type=Path, default=LI2023, help="li2023: of keydance's step")
     time.add_argument("--keydance", type=Path, help="binary to time in turn with PyTorch")
-    time.add_argument("--frames", type=int, nargs="+", default=[5, 30, 60])
-    time.add_argument("--batch", type=int, default=128)
+    time.add_argument("--frames", type=int, nargs="+", help="pan2021: 5 30 60; li2023: 50")
+    time.add_argument("--batch", type=int, help="windows; pan2021: 128, li2023: 12")
+    time.add_argument("--threads", type=int, default=2, help="li2023: and processes")
     time.add_argument("--rounds", type=int, default=5, help="turns; the best of each counts")
     time.add_argument(
         "--others-up-to",
@@ -47,10 +57,25 @@ def main():
 
     arguments = parser.parse_args()
     if arguments.command == "check":
-        return checks.check(arguments.weights, arguments.batch, arguments.tolerance)
+        return check_kind(arguments.weights, arguments.batch, arguments.tolerance)
     if arguments.command == "selftest":
-        return checks.selftest()
-    return timing.time_all(arguments)
+        return 1 if checks.selftest() + li2023_checks.selftest() else 0
+    frames, batch = SIZES[arguments.model]
+    arguments.frames = arguments.frames or frames
+    arguments.batch = arguments.batch or batch
+    chosen = li2023_timing if arguments.model == "li2023" else timing
+    return chosen.time_all(arguments)
+
+
+def check_kind(weights, batch, tolerance):
+    """By the kind of model that the weights are of."""
+    config = checks.config_of(weights)
+    kind = config.get("model", {}).get("kind", "pan2021")
+    if kind == "li2023":
+        return li2023_checks.check(weights, config, batch, tolerance)
+    if kind == "pan2021":
+        return checks.check(weights, batch, tolerance or 1e-4)
+    raise SystemExit(f"{weights}: there is no PyTorch version of {kind}")
 
 
 if __name__ == "__main__":

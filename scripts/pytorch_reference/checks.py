@@ -17,6 +17,7 @@ from synthetic import random_model, windows_and_statistics
 
 SELFTEST_TOLERANCE = 1e-9
 TINY = 1e-12
+JUDGED = ["outputs"] + [f"loss.{name}" for name in TERMS]
 
 
 def results(run, model, window, ground_truth_fed):
@@ -38,10 +39,9 @@ def difference(ours, theirs):
     return float("inf") if math.isnan(found) else found
 
 
-def compare(title, ours, theirs, tolerance):
+def compare(title, ours, theirs, tolerance, names=JUDGED):
     """Prints a table of the differences; returns the number of entries beyond the tolerance."""
     print(f"\n{title} (relative, tolerance {tolerance:g})")
-    names = ["outputs"] + [f"loss.{name}" for name in TERMS]
     gradients = {n: difference(ours[n], theirs[n]) for n in theirs if n.startswith("gradient.")}
     for name in names:
         value = f"{theirs[name].item():14.6g}" if name.startswith("loss.") else " " * 14
@@ -79,12 +79,16 @@ def load_model(path, dtype):
     return model.eval()
 
 
-def refuse_other_outputs(path):
-    """The reference has the paper's network only; what `root_frame` changes is in statistics and batch."""
+def config_of(path):
+    """The config that a run's weights were written with; empty where there is none."""
     with safe_open(path, "pt") as file:
         written = (file.metadata() or {}).get("keydance")
-    config = tomllib.loads(json.loads(written)["config"]) if written else {}
-    output = config.get("model", {}).get("output", "absolute")
+    return tomllib.loads(json.loads(written)["config"]) if written else {}
+
+
+def refuse_other_outputs(path):
+    """The reference has the paper's network only; what `root_frame` changes is in statistics and batch."""
+    output = config_of(path).get("model", {}).get("output", "absolute")
     if output != "absolute":
         raise SystemExit(f"{path}: model.output = {output}: the PyTorch version has absolute only")
 

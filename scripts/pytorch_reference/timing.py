@@ -13,6 +13,7 @@ import torch
 
 import optimised
 from layout import Statistics
+from losses import losses
 from reference import Pan2021
 from synthetic import windows_and_statistics
 from training import OneProcess, Shards
@@ -43,6 +44,16 @@ def make(name, fuse, dropout, rank):
     if name == "plain":
         return model, model
     return model, optimised.Optimised(model, dropout, optimised.Functions(fuse), CHUNK, seed=rank)
+
+
+def make_training(name, fuse, dropout, rank):
+    """The model and its loss of a window."""
+    model, run = make(name, fuse, dropout, rank)
+    return model, lambda window: losses(run(window), window, model.statistics)["total"]
+
+
+def split(window, parts):
+    return [part.contiguous() for part in window.chunk(parts, 1)]
 
 
 def windows(frames, count):
@@ -210,9 +221,13 @@ def time_all(arguments):
     )
     torch.set_num_threads(THREADS)
     trainers = {
-        "plain": OneProcess(*make("plain", False, DROPOUT, rank=0)),
-        "optimised, threaded products": OneProcess(*make("optimised", fuse, DROPOUT, rank=0)),
-        SHARDED: Shards(partial(make, "optimised", fuse, DROPOUT), THREADS),
+        "plain": OneProcess(*make_training("plain", False, DROPOUT, rank=0)),
+        "optimised, threaded products": OneProcess(
+            *make_training("optimised", fuse, DROPOUT, rank=0)
+        ),
+        SHARDED: Shards(
+            partial(make_training, "optimised", fuse, DROPOUT), split, THREADS, fuse
+        ),
     }
     time_training(arguments, trainers)
     trainers[SHARDED].close()

@@ -1,6 +1,7 @@
 """A training step: forward, losses, backward, Adam; in one process, or in several that share the batch.
 
-All parameters lie in one flat tensor, and so do their gradients, so that Adam is one fused operation.
+Every gradient is taken as autograd leaves it: nothing is set to 0, added up or copied but what another
+process has to see.
 """
 
 import traceback
@@ -8,59 +9,41 @@ import traceback
 import torch
 import torch.multiprocessing as multiprocessing
 
-from losses import losses
-
 LEARNING_RATE = 1e-4
+BETAS = (0.9, 0.999)
+EPSILON = 1e-8
 
 
-def flatten(model, weights, gradients):
-    """Makes the model's parameters and their gradients views of two flat tensors; the values go along."""
-    start = 0
-    for parameter in model.parameters():
-        end = start + parameter.numel()
-        weights[start:end] = parameter.detach().flatten()
-        parameter.data = weights[start:end].view_as(parameter)
-        parameter.grad = gradients[start:end].view_as(parameter)
-        start = end
-
-
-def adam(weights, gradients):
-    parameter = torch.nn.Parameter(weights)
-    parameter.grad = gradients
-    return torch.optim.Adam([parameter], lr=LEARNING_RATE, fused=True)
-
-
-def accumulate_gradients(run, window, statistics, gradients):
-    """One forward and backward with own predictions fed; gradients are set, not added to."""
-    gradients.zero_()
-    losses(run(window), window, statistics)["total"].backward()
+def views(model, flat):
+    """Parts of a flat tensor in the shapes of the model's parameters."""
+    sizes = [parameter.numel() for parameter in model.parameters()]
+    return [v.view_as(p) for v, p in zip(flat.split(sizes), model.parameters())]
 
 
 class OneProcess:
-    """Trains with `run`, a callable over `model`'s parameters; products take torch's threads."""
+    """Trains with `loss`, a function of a batch over `model`'s parameters; products take torch's threads."""
 
-    def __init__(self, model, run):
-        count = sum(p.numel() for p in model.parameters())
-        self.run, self.statistics = run, model.statistics
-        weights, self.gradients = torch.empty(count), torch.zeros(count)
-        flatten(model, weights, self.gradients)
-        self.optimiser = adam(weights, self.gradients)
+    def __init__(self, model, loss):
+        self.loss = loss
+        self.optimiser = torch.optim.Adam(model.parameters(), lr=LEARNING_RATE, fused=True)
 
-    def step(self, window):
-        accumulate_gradients(self.run, window, self.statistics, self.gradients)
+    def step(self, batch):
+        self.optimiser.zero_grad(set_to_none=True)
+        self.loss(batch).backward()
         self.optimiser.step()
 
 
 class Shards:
     """Trains in processes of one thread, each with its part of the batch and of the parameters to update.
 
-    `make(rank)` gives a worker its model and the callable over its parameters; every worker must make
-    the same weights. Products of one thread on half the batch scale better than threaded products.
+    `make(rank)` gives a worker its model and the loss over its parameters; every worker must make the
+    same weights. `split(batch, workers)` cuts a batch into parts of one size. Products of one thread on
+    half the batch scale better than threaded products.
     """
 
-    def __init__(self, make, workers=2):
+    def __init__(self, make, split, workers=2, fuse=False):
         context = multiprocessing.get_context("spawn")
-        self.workers = workers
+        self.workers, self.split = workers, split
         self.barrier = context.Barrier(workers + 1)
         self.queues = [context.SimpleQueue() for _ in range(workers)]
         count = sum(p.numel() for p in make(0)[0].parameters())
@@ -69,7 +52,7 @@ class Shards:
         self.processes = [
             context.Process(
                 target=work,
-                args=(rank, make, self.weights, gradients, self.queues[rank], self.barrier),
+                args=(rank, make, fuse, self.weights, gradients, self.queues[rank], self.barrier),
                 daemon=True,
             )
             for rank in range(workers)
@@ -78,9 +61,9 @@ class Shards:
             process.start()
         self.barrier.wait()
 
-    def step(self, window):
-        for queue, part in zip(self.queues, window.chunk(self.workers, 1)):
-            queue.put(part.contiguous())
+    def step(self, batch):
+        for queue, part in zip(self.queues, self.split(batch, self.workers)):
+            queue.put(part)
         self.barrier.wait()  # gradients are there
         self.barrier.wait()  # weights are updated
 
@@ -91,23 +74,49 @@ class Shards:
             process.join()
 
 
-def work(rank, make, weights, gradients, queue, barrier):
+def update(weights, gradients, first, second, rate, divisor):
+    """Adam on the mean of the processes' gradients, in one pass over memory where it is compiled."""
+    mean = gradients.mean(0)
+    first.lerp_(mean, 1 - BETAS[0])
+    second.mul_(BETAS[1]).addcmul_(mean, mean, value=1 - BETAS[1])
+    weights.sub_(rate * first / (second.sqrt() * divisor + EPSILON))
+
+
+def work(rank, make, fuse, weights, gradients, queue, barrier):
     try:
         torch.set_num_threads(1)
-        model, run = make(rank)
-        flatten(model, weights, gradients[rank])
+        model, loss = make(rank)
+        for view, parameter in zip(views(model, weights), model.parameters()):
+            view.copy_(parameter.detach())
+            parameter.data = view
+        for view, parameter in zip(views(model, gradients[rank]), model.parameters()):
+            parameter.register_post_accumulate_grad_hook(hand_over(view))
         share = weights.chunk(len(gradients))[rank]
         shares = gradients.chunk(len(gradients), 1)[rank]
-        mean = torch.zeros_like(share)
-        optimiser = adam(share, mean)
+        first, second = torch.zeros_like(share), torch.zeros_like(share)
+        move = torch.compile(update, dynamic=False) if fuse else update
+        steps = 0
         barrier.wait()
-        while (window := queue.get()) is not None:
-            accumulate_gradients(run, window, model.statistics, gradients[rank])
+        while (batch := queue.get()) is not None:
+            loss(batch).backward()
             barrier.wait()
-            torch.mean(shares, 0, out=mean)
-            optimiser.step()
+            steps += 1
+            corrections = [1 - beta**steps for beta in BETAS]
+            rate = torch.tensor(LEARNING_RATE / corrections[0])
+            with torch.no_grad():
+                move(share, shares, first, second, rate, torch.tensor(corrections[1] ** -0.5))
             barrier.wait()
     except Exception:
         traceback.print_exc()
         barrier.abort()
         raise
+
+
+def hand_over(view):
+    """While it is in the caches: each gradient to where the other processes read it."""
+
+    def hook(parameter):
+        view.copy_(parameter.grad)
+        parameter.grad = None
+
+    return hook

@@ -3,13 +3,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::warn;
 use crate::data::Dataset;
-use crate::models::transition::exported_batch::{ExportedBatch, export_batch};
-use crate::models::transition::{DanceClip, Forcing, TransitionSettings};
+use crate::models::exported_batch::ExportOptions;
+use crate::models::{Streams, TaskSetting};
 use crate::run::{RunFolder, check_outputs, replace_file};
 
 #[derive(Debug, Args)]
@@ -22,7 +21,7 @@ pub struct ExportBatchArgs {
     /// File to write, safetensors
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Frames of a transition
+    /// Frames of a transition; for a model of rotations of a window, its keyframes among them
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
     frames: u16,
     /// Windows in the batch
@@ -31,6 +30,9 @@ pub struct ExportBatchArgs {
     /// Feed the true frames instead of the model's predictions
     #[arg(long)]
     ground_truth: bool,
+    /// Compute in f64; models of rotations alone can
+    #[arg(long)]
+    f64: bool,
     /// Replace the file where it is there already
     #[arg(long)]
     force: bool,
@@ -43,20 +45,20 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let inputs = run.parts();
     check_outputs([&args.out], inputs.iter().chain([&args.data]), args.force)?;
     let config = run.config()?;
-    let settings = TransitionSettings::of(&config);
-    let settings = settings.context("only a model of transitions has batches to export")?;
-    let model = settings.load(&config.name, &run.saved_weights(&config)?)?;
     let dataset = Dataset::load(&args.data, &config.data)?;
     warn(&dataset.warnings);
-    let clips = DanceClip::measure_all(&dataset.train, &config.data.features())?;
-    let batch = ExportedBatch {
+    let setting = TaskSetting {
+        dataset: &dataset,
+        data: config.data.clone(),
+        streams: Streams::new(config.seed),
+    };
+    let options = ExportOptions {
         frames: args.frames.into(),
         windows: args.windows.into(),
-        forcing: match args.ground_truth {
-            true => Forcing::Teacher,
-            false => Forcing::FreeRunning,
-        },
+        ground_truth: args.ground_truth,
+        double: args.f64,
     };
-    let file = export_batch(&model, settings.model.root_frame(), &clips, &batch)?;
-    Ok(replace_file(&args.out, file)?)
+    let saved = run.saved_weights(&config)?;
+    let batch = config.model.export_batch(&saved, &setting, &options)?;
+    Ok(replace_file(&args.out, batch.to_safetensors()?)?)
 }

@@ -2,6 +2,7 @@
 //!
 //! - [`task`]: what training asks of a model;
 //! - [`generator`]: what a user, an evaluation or `generate` may ask of one;
+//! - [`exported_batch`]: a batch with a model's results, for comparison;
 //! - [`settings`]: what the commands ask of a kind of model;
 //! - [`registry`]: the list of kinds;
 //! - [`transition`]: what the models of transitions between two keyframes share;
@@ -11,6 +12,7 @@
 pub mod baselines;
 #[cfg(feature = "papers")]
 pub mod duan2022;
+pub mod exported_batch;
 pub mod generator;
 pub mod gradient_report;
 #[cfg(feature = "papers")]

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 use toml::Table;
 
+use super::exported_batch::{ExportOptions, ExportedBatch};
 use super::weights::{SavedWeights, WeightsError};
 use super::{Generator, ModelError, Streams, Task};
 use crate::autograd::check::CheckReport;
@@ -142,6 +143,20 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
         Err(lacks(self.kind(), "gradient check"))
     }
 
+    /// Training windows with what saved weights make of them, for comparison with another
+    /// implementation.
+    ///
+    /// # Errors
+    /// The weights are those of another model; there are no such windows; a model that has none.
+    fn export_batch(
+        &self,
+        _saved: &SavedWeights,
+        _setting: &TaskSetting<'_>,
+        _options: &ExportOptions,
+    ) -> Result<ExportedBatch, LoadError> {
+        Err(lacks(self.kind(), "batch to export").into())
+    }
+
     fn clone_box(&self) -> Box<dyn ModelSettings>;
 }
 
@@ -153,7 +168,7 @@ fn lacks(model: &str, what: &str) -> ModelError {
     }
 }
 
-/// What a task is built from beside the model's own settings.
+/// What a task or a batch is built from beside the model's own settings.
 #[derive(Debug, Clone)]
 pub struct TaskSetting<'d> {
     pub dataset: &'d Dataset,

@@ -5,8 +5,9 @@ use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::{GivenWindow, WindowTruth};
 use crate::data::Recording;
-use crate::models::transition::Window;
+use crate::models::transition::{RootFrame, Window};
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
 use crate::motion::{Clip, ContactRule, Feet, Foot, at_tempo, mirror_image};
@@ -58,6 +59,29 @@ impl TrainingClip {
             contacts,
             facing,
         })
+    }
+
+    /// The `frames` frames from `start` on, between the first and the last of them as keyframes.
+    ///
+    /// # Panics
+    /// They are not all in the clip, or fewer than two.
+    pub fn window(
+        &self,
+        start: usize,
+        frames: usize,
+        root_frame: RootFrame,
+    ) -> (GivenWindow, WindowTruth) {
+        let poses = &self.clip.poses[start..start + frames];
+        let contacts = self.contacts[start..start + frames].iter();
+        let given = GivenWindow::new(
+            &self.clip.skeleton,
+            &self.facing,
+            root_frame,
+            &[(0, &poses[0]), (frames - 1, &poses[frames - 1])],
+            contacts.map(|foot| foot.one_hot()).collect(),
+        );
+        let truth = given.truth(poses);
+        (given, truth)
     }
 
     /// Number of frames.

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::settings::build;
-use super::{Batch, Body, GivenWindow, RotationSettings, TrainingClip, WindowStatistics};
+use super::{Batch, Body, RotationSettings, TrainingClip, WindowStatistics};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::choreography::{ChoreographyConfig, generate};
@@ -53,22 +53,13 @@ pub fn generated_batch<S: RotationSettings>(
         .map(|clip| TrainingClip::new(clip.clip, settings.contact_rule(), 0.15, rng()))
         .collect::<Result<_, _>>()?;
     let start = SPARE_FRAMES / 2;
-    let (mut given, mut truths) = (Vec::new(), Vec::new());
-    for clip in &clips {
-        let poses = &clip.clip.poses[start..start + frames];
-        let contacts = clip.contacts[start..start + frames].iter();
-        let window = GivenWindow::new(
-            &clip.clip.skeleton,
-            &clip.facing,
-            settings.root_frame(),
-            &[(0, &poses[0]), (frames - 1, &poses[frames - 1])],
-            contacts.map(|foot| foot.one_hot()).collect(),
-        );
-        truths.push(window.truth(poses));
-        given.push(window);
-    }
+    let root_frame = settings.root_frame();
+    let windows_of = clips
+        .iter()
+        .map(|clip| clip.window(start, frames, root_frame));
+    let (given, truths): (Vec<_>, Vec<_>) = windows_of.unzip();
     let cut: Vec<Window> = (0..windows).map(|clip| Window { clip, start }).collect();
-    let statistics = WindowStatistics::of(&clips, &cut, frames, settings.root_frame());
+    let statistics = WindowStatistics::of(&clips, &cut, frames, root_frame);
     let body = Body::of(&clips[0].clip.skeleton);
     Ok((Batch::of(&given, &truths, input), body, statistics))
 }

@@ -11,6 +11,7 @@
 mod batch;
 mod body;
 mod clips;
+mod exported_batch;
 mod gradient_check;
 mod made_up;
 mod network;

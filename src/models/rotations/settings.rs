@@ -6,6 +6,7 @@ use rand::Rng;
 use serde::Serialize;
 use toml::Table;
 
+use super::exported_batch;
 use super::gradient_check;
 use super::made_up::MadeUpTask;
 use super::task::RotationTask;
@@ -14,6 +15,7 @@ use super::{AugmentationConfig, Body, RotationNetwork, ScheduleConfig, WindowSta
 use crate::autograd::check::CheckReport;
 use crate::autograd::{Parameters, Real};
 use crate::data::DataConfig;
+use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
@@ -74,6 +76,37 @@ pub(super) fn build<S: RotationSettings, T: Real, R: Rng>(
     }
 }
 
+/// A network with its saved weights.
+pub(super) struct Loaded {
+    pub body: Body,
+    pub statistics: WindowStatistics,
+    pub network: Box<dyn RotationNetwork<f32>>,
+    pub parameters: Parameters<f32>,
+}
+
+/// # Errors
+/// The weights are those of another model.
+pub(super) fn loaded<S: RotationSettings>(
+    settings: &S,
+    saved: &SavedWeights,
+) -> Result<Loaded, LoadError> {
+    let body = Body::saved(saved)?;
+    let statistics = WindowStatistics::saved(saved, &body)?;
+    let mut parameters = Parameters::new();
+    // Overwritten by the saved values, whatever is drawn.
+    let rng = Streams::new(0).initialisation();
+    let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
+    let network = build(settings, &mut init, &body, &statistics)?;
+    let known = statistics.statistics(body.statistics(Statistics::default()));
+    saved.load_into(&mut parameters, &known)?;
+    Ok(Loaded {
+        body,
+        statistics,
+        network,
+        parameters,
+    })
+}
+
 impl<S: RotationSettings> ModelSettings for S {
     fn kind(&self) -> &str {
         S::KIND
@@ -126,17 +159,20 @@ impl<S: RotationSettings> ModelSettings for S {
     }
 
     fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        let body = Body::saved(saved)?;
-        let statistics = WindowStatistics::saved(saved, &body)?;
-        let mut parameters = Parameters::new();
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = build(self, &mut init, &body, &statistics)?;
-        let known = statistics.statistics(body.statistics(Statistics::default()));
-        saved.load_into(&mut parameters, &known)?;
-        let reference = Reference::new(body, self)?;
-        let trained = TrainedRotations::new(name, network.into(), parameters, reference);
+        let model = loaded(self, saved)?;
+        let reference = Reference::new(model.body, self)?;
+        let trained =
+            TrainedRotations::new(name, model.network.into(), model.parameters, reference);
         Ok(Box::new(trained))
+    }
+
+    fn export_batch(
+        &self,
+        saved: &SavedWeights,
+        setting: &TaskSetting<'_>,
+        options: &ExportOptions,
+    ) -> Result<ExportedBatch, LoadError> {
+        exported_batch::export(self, saved, setting, options)
     }
 
     fn check_gradients(

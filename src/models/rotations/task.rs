@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::clips::Forms;
 use super::schedule::{BatchPlan, Schedule};
 use super::trained::{Reference, TrainedRotations};
-use super::{Batch, Body, GivenWindow, RotationNetwork, RotationSettings, WindowStatistics};
+use super::{Batch, Body, RotationNetwork, RotationSettings, WindowStatistics};
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::counted::counted;
 use crate::models::settings::TaskSetting;
@@ -173,17 +173,10 @@ impl Step<f32> for RotationStep<'_> {
             let streams = self.task.streams;
             let mut stream = streams.stream("augmentation", &[self.step, index as u64]);
             let (clip, start) = self.task.forms.draw(windows[index], *frames, &mut stream);
-            let poses = &clip.clip.poses[start..start + frames];
-            let contacts = &clip.contacts[start..start + frames];
-            let window = GivenWindow::new(
-                &clip.clip.skeleton,
-                &clip.facing,
-                self.task.reference.root_frame,
-                &[(0, &poses[0]), (frames - 1, &poses[frames - 1])],
-                contacts.iter().map(|foot| foot.one_hot()).collect(),
-            );
-            truths.push(window.truth(poses));
+            let root_frame = self.task.reference.root_frame;
+            let (window, truth) = clip.window(start, *frames, root_frame);
             given.push(window);
+            truths.push(truth);
         }
         let batch = Batch {
             total_windows: windows.len(),

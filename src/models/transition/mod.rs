@@ -12,7 +12,7 @@
 mod augmentation;
 mod dance_clip;
 pub mod effect;
-pub mod exported_batch;
+mod exported_batch;
 mod generator;
 pub mod gradient_check;
 mod kind;

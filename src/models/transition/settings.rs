@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+use super::exported_batch;
 use super::gradient_check::{self, GradientCheckError};
 use super::made_up::MadeUpTask;
 use super::task::TransitionTask;
@@ -12,6 +13,7 @@ use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::DataConfig;
 use crate::experiment::ExperimentConfig;
+use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
@@ -194,6 +196,20 @@ impl ModelSettings for TransitionSettings {
             GradientCheckError::Model(error) => error,
             other => ModelError::data(&other),
         })
+    }
+
+    fn export_batch(
+        &self,
+        saved: &SavedWeights,
+        setting: &TaskSetting<'_>,
+        options: &ExportOptions,
+    ) -> Result<ExportedBatch, LoadError> {
+        let model = self.load(self.kind(), saved)?;
+        let clips = &setting.dataset.train;
+        let clips = super::DanceClip::measure_all(clips, &setting.data.features())
+            .map_err(|error| ModelError::data(&error))?;
+        let root_frame = self.model.root_frame();
+        Ok(exported_batch::export(&model, root_frame, &clips, options)?)
     }
 
     fn clone_box(&self) -> Box<dyn ModelSettings> {
