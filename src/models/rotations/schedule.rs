@@ -108,15 +108,16 @@ impl ScheduleConfig {
 
     /// How much of the schedule is trained, for the caption of a table.
     pub fn budget(&self) -> String {
-        let share = match self.frame_steps {
-            Some(frames) => format!("{frames} frame-steps"),
-            None => format!("{} of the schedule", self.fraction),
-        };
         let LengthConfig { min, max } = self.lengths;
-        format!(
-            "{share}, batches of {} windows of {min} to {max} frames",
+        let batch = format!(
+            "batches of {} windows of {min} to {max} frames",
             self.batch_size
-        )
+        );
+        match self.frame_steps {
+            // What came of it stands beside this.
+            Some(_) => batch,
+            None => format!("{} of the schedule, {batch}", self.fraction),
+        }
     }
 }
 
@@ -178,6 +179,12 @@ impl Schedule {
     /// Steps of the schedule, whatever its fraction.
     pub fn whole_steps(&self) -> u64 {
         self.whole_steps
+    }
+
+    /// Frames that the whole schedule trains, at its mean length.
+    pub fn whole_frame_steps(&self) -> u64 {
+        let LengthConfig { min, max } = self.config.lengths;
+        self.windows.len() as u64 * self.config.epochs * (min + max) as u64 / 2
     }
 
     /// Frames that are trained.

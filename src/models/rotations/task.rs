@@ -135,8 +135,8 @@ impl Task<f32> for RotationTask {
     fn facts(&self) -> Map<String, Value> {
         let mut facts = Map::new();
         facts.insert(
-            "whole_schedule_steps".into(),
-            json!(self.schedule.whole_steps()),
+            "whole_schedule_frame_steps".into(),
+            json!(self.schedule.whole_frame_steps()),
         );
         facts.insert(
             "training_windows".into(),
