@@ -6,7 +6,8 @@ use glam::DVec3;
 /// Root positions of every frame, `[frames]`, cm.
 ///
 /// ```text
-/// step_t = - s_right,t (P_R,t+1 - P_R,t) - s_left,t (P_L,t+1 - P_L,t),   R_t = R_1 + step_1 + .. + step_(t-1)
+/// step_t = - s_right,t (P_R,t+1 - P_R,t) - s_left,t (P_L,t+1 - P_L,t)
+/// R_t = R_1 + step_1 + .. + step_(t-1)
 /// ```
 ///
 /// `feet`: P, positions of the right and the left foot relative to the root in the world's
