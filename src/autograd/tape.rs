@@ -314,8 +314,12 @@ impl<'a, T: Real> Tape<'a, T> {
         node.is_some_and(|node| node.stamp == var.stamp)
     }
 
-    /// Refuses operands that are not on this tape: each operation begins with it.
-    pub(super) fn own(&self, operation: &'static str, vars: &[Var]) -> Result<(), AutogradError> {
+    /// Refuses operands that are not on this tape. An operation that compares shapes before
+    /// [`Tape::record`] begins with it, else its error is about the shape `[0]`.
+    ///
+    /// # Errors
+    /// An operand of another tape, or one that was forgotten.
+    pub fn own(&self, operation: &'static str, vars: &[Var]) -> Result<(), AutogradError> {
         match vars.iter().position(|&var| !self.has(var)) {
             None => Ok(()),
             Some(place) => {
@@ -390,7 +394,8 @@ impl<'a, T: Real> Tape<'a, T> {
     /// Puts the output of an operation of one's own on the tape: `name` for errors, the `inputs`
     /// that it was computed from, and the way back, which is asked for only where one is wanted.
     ///
-    /// `examples/custom_operation.rs` is a whole one, with the property check of its gradient.
+    /// `examples/custom_operation.rs` is a whole one, with the property check of its gradient. One
+    /// of several operands asks [`Tape::own`] before it compares them.
     ///
     /// # Errors
     /// An input of another tape.
