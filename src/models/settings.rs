@@ -44,8 +44,8 @@ pub trait ModelKind: Send + Sync {
         self.name()
     }
 
-    /// The papers whose tables and figures its models may stand in, by a config's `paper`: the first
-    /// where a config names none.
+    /// The papers whose tables and figures its models may stand in, by a config's `paper`: the
+    /// first where a config names none.
     fn papers(&self) -> Vec<Paper>;
 
     /// The tables of a config that are its own, `[model]` among them, with the default of every

@@ -339,7 +339,8 @@ fn a_turn_of_the_clip_and_a_shift_change_no_score() {
         }
         from_clips(turned)
     };
-    // All but those that go by the label: of two ankles at one height, rounding makes one the lower.
+    // All but those that go by the label: of two ankles at one height, rounding makes one the
+    // lower.
     let metrics = [&SIX[..], &["root_error", "root_error_at_k2", "foot_skate"]].concat();
     for protocol in [dance(&[10, 50]), lafan1(&[5, 54])] {
         let plain = scores(&protocol, &model, &turned(0.0, DVec3::ZERO));

@@ -72,8 +72,8 @@ pub trait TransitionProtocol: Send + Sync {
 
     /// Measures a prediction against the recorded window.
     ///
-    /// `recorded`: `[window, 154]`, frames k1 to k2; `predicted`: `[window - 1, 149]`, frames k1 + 1
-    /// to k2; neither is standardised.
+    /// `recorded`: `[window, 154]`, frames k1 to k2; `predicted`: `[window - 1, 149]`, frames
+    /// k1 + 1 to k2; neither is standardised.
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NoFrames`] or [`ModelError::NotFinite`] where the two

@@ -48,8 +48,8 @@ pub struct Li2023Config {
     pub state_decoder: StateDecoder,
     /// The state decoder begins at 0, so that training begins at the interpolation.
     pub zero_decoder: bool,
-    /// X_res is multiplied by min(1, d / `fade_frames`), d frames from the nearer keyframe; 0: by 1,
-    /// as in the paper.
+    /// X_res is multiplied by min(1, d / `fade_frames`), d frames from the nearer keyframe; 0: by
+    /// 1, as in the paper.
     pub fade_frames: usize,
     /// Probability that a branch of the last block is dropped in training; it grows from 0 in the
     /// first block.

@@ -34,7 +34,8 @@
 //! # Ok::<(), keydance::motion::bvh::BvhError>(())
 //! ```
 //!
-//! Of files: [`read`] and [`write`](write()). Channels for a clip that had none: [`channel_layout`].
+//! Of files: [`read`] and [`write`](write()). Channels for a clip that had none:
+//! [`channel_layout`].
 
 mod document;
 mod error;
