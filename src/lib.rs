@@ -30,6 +30,7 @@
 //! The modules in reading order, the path of the data:
 //!
 //! - [`motion`] - BVH, skeletons, poses, kinematics, facing, contact; no learning.
+//! - [`music`] - sound files, spectra, onsets, tempo, beats; no learning.
 //! - [`data`] - files become recordings, recordings a split.
 //! - [`autograd`] - reverse-mode differentiation on a tape, and the kernels under it.
 //! - [`nn`] - layers of weights, built on the tape's operations.
@@ -59,6 +60,8 @@ pub mod evaluation;
 pub mod experiment;
 pub mod models;
 pub mod motion;
+#[cfg(feature = "music")]
+pub mod music;
 pub mod nn;
 pub mod optim;
 pub mod report;
