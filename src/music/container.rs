@@ -32,7 +32,7 @@ impl Container {
 }
 
 /// Begins of files that are no sound or none that is decoded: where, what, with article.
-const OTHERS: [(usize, &[u8], &str); 21] = [
+const OTHERS: [(usize, &[u8], &str); 24] = [
     (
         4,
         b"ftyp",
@@ -52,6 +52,9 @@ const OTHERS: [(usize, &[u8], &str); 21] = [
     (0, b"MAC ", "a Monkey's Audio file"),
     (0, b"wvpk", "a WavPack file"),
     (0, b"ADIF", "an AAC file"),
+    (0, b"\xff\xf1", "an AAC file"),
+    (0, b"\xff\xf9", "an AAC file"),
+    (0, b"\xff\xfd", "an MPEG layer II file (mp2)"),
     (0, b".snd", "an AU file"),
     (0, b"RIFF", "a RIFF file without wave sound"),
     (0, b"\x89PNG", "a PNG picture"),

@@ -8,7 +8,7 @@ use symphonia::core::codecs::audio::{AudioDecoder, AudioDecoderOptions};
 use symphonia::core::errors::Error;
 use symphonia::core::formats::probe::Hint;
 use symphonia::core::formats::{FormatOptions, FormatReader, TrackType};
-use symphonia::core::io::{MediaSource, MediaSourceStream};
+use symphonia::core::io::{MediaSource, MediaSourceStream, ReadOnlySource};
 use symphonia::core::meta::MetadataOptions;
 use symphonia::core::packet::Packet;
 
@@ -95,12 +95,24 @@ fn decode(mut source: impl MediaSource + 'static, file: &str) -> Result<Sound, F
     let container =
         recognise(&mut source)?.map_err(|what| MusicError::OtherFormat { file: file(), what })?;
     source.rewind()?;
-    let stream = MediaSourceStream::new(Box::new(source), Default::default());
+    let source: Box<dyn MediaSource> = match container {
+        // Where the source has a length, symphonia guesses the sound's and cuts what is beyond.
+        Container::Mp3 { has_length: false } => Box::new(ReadOnlySource::new(source)),
+        _ => Box::new(source),
+    };
+    let stream = MediaSourceStream::new(source, Default::default());
     let (options, metadata) = (FormatOptions::default(), MetadataOptions::default());
     let probe = symphonia::default::get_probe();
     let format = probe
         .probe(&Hint::new(), stream, options, metadata)
         .map_err(|error| match error {
+            // The probe's own words, where no reader took what it saw.
+            Error::Unsupported(problem) if problem.starts_with("core (probe)") => {
+                MusicError::Damaged {
+                    file: file(),
+                    problem: "no part of it can be decoded".into(),
+                }
+            }
             Error::Unsupported(problem) => MusicError::Codec {
                 file: file(),
                 container: container.name(),
@@ -130,7 +142,8 @@ struct Decoding {
     /// Samples of a channel that were decoded, and those that silence stands for.
     decoded: u64,
     replaced: u64,
-    damaged_packets: usize,
+    /// When the packet that follows should begin, samples; unknown at first.
+    next: Option<i64>,
     not_finite: usize,
     interleaved: Vec<f64>,
     mean: Vec<f64>,
@@ -152,8 +165,6 @@ impl Decoding {
             rate,
             announced,
         } = begin_track(&*format, container, &file)?;
-        let says_length = container != Container::Mp3 { has_length: false };
-        let announced = announced.filter(|_| says_length);
         // A header that lies is found out as the samples come.
         let seconds = announced.unwrap_or(0) / u64::from(rate.max(1));
         if seconds > LONGEST && bytes / LEAST_BYTES >= seconds {
@@ -170,7 +181,7 @@ impl Decoding {
             announced,
             decoded: 0,
             replaced: 0,
-            damaged_packets: 0,
+            next: None,
             not_finite: 0,
             interleaved: Vec::new(),
             mean: Vec::new(),
@@ -188,11 +199,18 @@ impl Decoding {
                 Err(Error::ResetRequired) => self.next_sound()?,
                 Err(error) => return Ok(Some(error)),
             }
-            if self.decoded + self.replaced > LONGEST * u64::from(self.rate) {
-                let file = self.file.clone();
-                return Err(MusicError::TooLong { file });
-            }
+            self.check_length(0)?;
         }
+    }
+
+    /// Refuses what with so many samples more would be too long.
+    fn check_length(&self, more: u64) -> Result<(), MusicError> {
+        let samples = (self.decoded + self.replaced).saturating_add(more);
+        if samples > LONGEST * u64::from(self.rate) {
+            let file = self.file.clone();
+            return Err(MusicError::TooLong { file });
+        }
+        Ok(())
     }
 
     fn next_sound(&mut self) -> Result<(), MusicError> {
@@ -205,6 +223,7 @@ impl Decoding {
             });
         }
         (self.decoder, self.track) = (next.decoder, next.track);
+        self.next = None;
         self.announced = self
             .announced
             .zip(next.announced)
@@ -213,14 +232,16 @@ impl Decoding {
     }
 
     fn take(&mut self, packet: &Packet) -> Result<(), MusicError> {
+        let begins = packet.pts.get();
+        let lost = self
+            .next
+            .map_or(0, |next| begins.saturating_sub(next).max(0));
+        let length = packet.dur.get() as i64;
+        let trimmed = (packet.trim_start.get() + packet.trim_end.get()) as i64;
+        self.next = Some(begins.saturating_add(length.saturating_add(trimmed)));
+        self.silence(lost.unsigned_abs())?;
         let Ok(buffer) = self.decoder.decode(packet) else {
-            // Silence, so that what follows keeps its time.
-            self.damaged_packets += 1;
-            let samples = packet.dur.get().min(LONGEST_PACKET);
-            self.replaced += samples;
-            self.mean.clear();
-            self.mean.resize(samples as usize, 0.0);
-            return self.resampler.push(&self.mean);
+            return self.silence(packet.dur.get().min(LONGEST_PACKET));
         };
         let (rate, channels) = (buffer.spec().rate(), buffer.spec().channels().count());
         if buffer.frames() == 0 || channels == 0 {
@@ -245,11 +266,26 @@ impl Decoding {
         self.resampler.push(&self.mean)
     }
 
+    /// Stands for samples that were lost, so that what follows keeps its time.
+    fn silence(&mut self, samples: u64) -> Result<(), MusicError> {
+        self.check_length(samples)?;
+        self.replaced += samples;
+        let mut left = samples;
+        while left > 0 {
+            let part = left.min(LONGEST_PACKET);
+            self.mean.clear();
+            self.mean.resize(part as usize, 0.0);
+            self.resampler.push(&self.mean)?;
+            left -= part;
+        }
+        Ok(())
+    }
+
     fn finish(self, end: End) -> Result<Sound, MusicError> {
         if self.decoded == 0 {
             let problem = match end {
                 Some(error) => problem(&error),
-                None if self.damaged_packets > 0 => "no part of it can be decoded".into(),
+                None if self.replaced > 0 => "no part of it can be decoded".into(),
                 None => "it holds no sample".into(),
             };
             let file = self.file;
@@ -273,10 +309,9 @@ impl Decoding {
                 problem(&error)
             ));
         }
-        if self.damaged_packets > 0 {
+        if self.replaced > 0 {
             warnings.push(format!(
-                "is damaged: silence stands for {} ({:.2} s) that cannot be decoded",
-                counted(self.damaged_packets, "packet"),
+                "is damaged: silence stands for {:.2} s that cannot be decoded",
                 seconds(self.replaced)
             ));
         }

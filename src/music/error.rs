@@ -7,6 +7,7 @@ use thiserror::Error;
 use super::decode::LONGEST;
 use super::resample::{HIGHEST_RATE, LOWEST_RATE};
 use super::sound::{HOP, RATE};
+use crate::counted::counted;
 
 /// Why a sound cannot be heard.
 #[derive(Debug, Error)]
@@ -58,8 +59,8 @@ pub enum MusicError {
     )]
     TooLong { file: String },
     #[error(
-        "{file} has {samples} samples at {RATE} Hz, less than a frame of {HOP} (1/30 s); give a \
-         longer sound"
+        "{file} has {}, less than the {HOP} of a frame (1/30 s at {RATE} Hz); give a longer sound",
+        counted(*samples, "sample")
     )]
     TooShort { file: String, samples: usize },
     #[error("a sound cannot be brought to {RATE} Hz: {problem}")]

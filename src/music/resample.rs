@@ -15,8 +15,8 @@ pub const HIGHEST_RATE: u32 = 384_000;
 
 /// Samples of the filter, of the lower of both rates, and where it has halved, relative to half
 /// that rate: together they come nearest to the response of soxr's HQ, librosa's choice.
-const LENGTH: u32 = 184;
-const CUTOFF: f32 = 0.957;
+const LENGTH: u32 = 188;
+const CUTOFF: f32 = 0.9569;
 /// Filters between two samples at most, more only where that makes every position exact.
 const BETWEEN: u32 = 1024;
 /// Samples that are resampled at a time.
