@@ -29,6 +29,10 @@ pub struct DataConfig {
     /// Axis that points up in the files: "y", "z"; "auto" recognises it by how the body stands.
     #[serde(skip_serializing_if = "is_default")]
     pub up: Up,
+    /// Whether every clip comes with its music: a sound file of its name, beside it or in the
+    /// folder `audio`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub music: bool,
     /// Frames a second of the files, whatever their headers say.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source_fps: Option<f64>,
@@ -58,6 +62,7 @@ impl Default for DataConfig {
             mapping: None,
             unit: Unit::Auto,
             up: Up::Auto,
+            music: false,
             source_fps: None,
             skip_frames: 0,
         }
@@ -87,6 +92,9 @@ pub enum Split {
     /// LaFAN1: files `theme_subjectN.bvh`; subject 5 tests, the others train. Numbers of files and
     /// frames other than those of its 77 files are warned of.
     Lafan1,
+    /// The 43 dances with music: which train, validate and test stands in the folder's
+    /// `split.json`; their numbers and frames are checked.
+    MusicDance,
     /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest
     /// tests.
     Share(f64),

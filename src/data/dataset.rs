@@ -2,25 +2,36 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+#[cfg(feature = "music")]
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-use super::config::DataConfig;
+use super::config::{DataConfig, Split};
 use super::folder::{clip_files, left_out};
+use super::listed;
+#[cfg(feature = "music")]
+use super::pairs;
 use super::reading::{FileReading, grouped};
-use super::split::{Parts, check_dance_frames, lafan1_warning, split};
+use super::split::{Parts, check_dance_frames, check_music_dance_frames, lafan1_warning, split};
 use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
+#[cfg(feature = "music")]
+use crate::music::{Analysis, Cache};
 
 /// A recorded dance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The motion at the config's rate; its name is the file's, with the extension.
     pub clip: Clip,
+    /// What is heard in its music, from frame 0 of the motion on.
+    #[cfg(feature = "music")]
+    pub music: Option<Arc<Analysis>>,
 }
 
 /// A data set, split.
@@ -31,9 +42,12 @@ pub struct Dataset {
     pub validation: Vec<Recording>,
     pub test: Vec<Recording>,
     /// SHA-256 over the files' names and bytes, hexadecimal: what
-    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder. Of clips without files, over
-    /// names and poses.
+    /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder; where clips have music, of each
+    /// clip and its sound file together. Of clips without files, over names and poses.
     pub digest: String,
+    /// Frames of clips by a name of theirs, such as those of new poses: by clip, each range from
+    /// its first frame up to the one after its last.
+    pub named_frames: BTreeMap<String, BTreeMap<String, Vec<Range<usize>>>>,
     /// What is odd about the files, or was changed in reading them; no error.
     pub warnings: Vec<String>,
 }
@@ -94,6 +108,30 @@ pub enum DataError {
         value: String,
         expected: &'static str,
     },
+    #[error("{first} and {second} are music of one name; keep one of them")]
+    TwoSounds { first: PathBuf, second: PathBuf },
+    #[error(
+        "{dance} has no music: data.music = true asks for a sound file of its name (wav, flac, mp3 \
+         or ogg) beside it or in the folder audio"
+    )]
+    NoSound { dance: String },
+    #[error(
+        "{dance} has {frames} and its music {sound} only {heard} (at 30 a second); cut the dance, or \
+         give the whole music"
+    )]
+    ShortMusic {
+        dance: String,
+        frames: String,
+        sound: PathBuf,
+        heard: String,
+    },
+    #[error("data.music = true: this build hears nothing; build with the feature music")]
+    Deaf,
+    #[error("{path} is not what it should be: {problem}")]
+    Listed { path: PathBuf, problem: String },
+    #[cfg(feature = "music")]
+    #[error(transparent)]
+    Music(#[from] crate::music::MusicError),
     #[error(transparent)]
     Bvh(#[from] BvhError),
     #[error(transparent)]
@@ -105,6 +143,15 @@ pub enum DataError {
 }
 
 impl Recording {
+    /// A clip at the config's rate, without music.
+    pub fn of(clip: Clip) -> Self {
+        Self {
+            clip,
+            #[cfg(feature = "music")]
+            music: None,
+        }
+    }
+
     /// A clip in cm with Y up, brought to the config's rate and, where there is a mapping, onto its
     /// skeleton.
     ///
@@ -120,7 +167,7 @@ impl Recording {
             Some(mapping) => mapping.apply(&clip)?,
             None => clip,
         };
-        Ok(Self { clip })
+        Ok(Self::of(clip))
     }
 
     /// The file's name with its extension.
@@ -143,9 +190,15 @@ impl Dataset {
         let files = clip_files(folder)?;
         let names: Vec<String> = files.keys().cloned().collect();
         let origin = format!("the data folder {}", folder.display());
-        let mut dataset = Self::assemble(&names, &origin, config, |name, mapping| {
-            read_clip(&files[name], name, mapping, config)
+        let listed = match config.split {
+            Split::MusicDance => Some(listed::parts(folder)?),
+            _ => None,
+        };
+        let hear = hearing(folder, config)?;
+        let mut dataset = Self::assemble(&names, &origin, config, listed, |name, mapping| {
+            hear(read_clip(&files[name], name, mapping, config)?)
         })?;
+        dataset.named_frames = listed::named_frames(folder)?;
         dataset.warnings.extend(twins(&dataset)?);
         dataset.warnings.extend(left_out(folder));
         Ok(dataset)
@@ -175,7 +228,7 @@ impl Dataset {
             }
         }
         let names: Vec<String> = by_name.keys().cloned().collect();
-        Self::assemble(&names, "the set of clips", config, |name, mapping| {
+        Self::assemble(&names, "the set of clips", config, None, |name, mapping| {
             let clip = &by_name[name];
             Ok(ReadClip {
                 recording: Recording::new(clip.clone(), mapping, config)?,
@@ -191,9 +244,13 @@ impl Dataset {
         names: &[String],
         origin: &str,
         config: &DataConfig,
+        listed: Option<Parts>,
         read: impl Fn(&String, Option<&Mapping>) -> Result<ReadClip, DataError> + Sync,
     ) -> Result<Self, DataError> {
-        let parts = split(names, origin, config)?;
+        let parts = match listed {
+            Some(parts) => listed::among(parts, names, origin)?,
+            None => split(names, origin, config)?,
+        };
         let read = |names: &Vec<String>| -> Result<Vec<ReadClip>, DataError> {
             let clips: Vec<_> = names
                 .par_iter()
@@ -216,11 +273,53 @@ impl Dataset {
             validation: clips(validation),
             test: clips(test),
             digest,
+            named_frames: BTreeMap::new(),
             warnings,
         };
+        check_music_dance_frames(&dataset, origin, config)?;
         check_dance_frames(&dataset, origin, config)?;
         dataset.warnings.extend(lafan1_warning(&dataset, config));
         Ok(dataset)
+    }
+}
+
+/// What gives a clip that was read its music, where the config asks for it.
+#[cfg(feature = "music")]
+fn hearing(
+    folder: &Path,
+    config: &DataConfig,
+) -> Result<impl Fn(ReadClip) -> Result<ReadClip, DataError> + Sync, DataError> {
+    let cache = Cache::of_user();
+    let sounds = config
+        .music
+        .then(|| pairs::sound_files(folder))
+        .transpose()?;
+    Ok(move |mut clip: ReadClip| {
+        let Some(sounds) = &sounds else {
+            return Ok(clip);
+        };
+        let name = clip.recording.name();
+        let no_sound = || DataError::NoSound { dance: name.into() };
+        let sound = pairs::sound_of(name, sounds).ok_or_else(no_sound)?;
+        let bytes = std::fs::read(sound).map_err(|source| DataError::File {
+            path: sound.clone(),
+            source,
+        })?;
+        clip.digest = file_digest(format!("{} {}", clip.digest, file_digest(&bytes)).as_bytes());
+        let (recording, notices) = pairs::with_music(clip.recording, sound, &cache)?;
+        clip.notices.extend(notices);
+        Ok(ReadClip { recording, ..clip })
+    })
+}
+
+#[cfg(not(feature = "music"))]
+fn hearing(
+    _folder: &Path,
+    config: &DataConfig,
+) -> Result<impl Fn(ReadClip) -> Result<ReadClip, DataError> + Sync, DataError> {
+    match config.music {
+        true => Err(DataError::Deaf),
+        false => Ok(Ok),
     }
 }
 

@@ -9,9 +9,26 @@ use super::dataset::DataError;
 /// How deep clips are looked for that are not read.
 const DEEPEST: usize = 6;
 
-/// The BVH files in a folder by their names, sorted bytewise. A name that is not UTF-8 has U+FFFD
-/// in place of what is not.
+/// Folder of the dances in a data folder that keeps their music beside it.
+const DANCES: &str = "motion";
+
+/// The folder whose files are the clips: the data folder, or its `motion` where it has none itself.
+fn dances(folder: &Path) -> Result<PathBuf, DataError> {
+    let below = folder.join(DANCES);
+    let has_clips =
+        |folder: &Path| entries(folder).map(|it| it.iter().any(|it| is_clip(&it.path())));
+    Ok(
+        match !has_clips(folder)? && below.is_dir() && has_clips(&below)? {
+            true => below,
+            false => folder.into(),
+        },
+    )
+}
+
+/// The BVH files in a folder, or in its `motion`, by their names, sorted bytewise. A name that is
+/// not UTF-8 has U+FFFD in place of what is not.
 pub(crate) fn clip_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
+    let folder = &dances(folder)?;
     let mut files = BTreeMap::new();
     for path in entries(folder)?.iter().map(DirEntry::path) {
         if !is_clip(&path) {
@@ -41,6 +58,7 @@ pub(crate) fn clip_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Dat
 
 /// A warning about BVH files in folders inside a folder.
 pub(super) fn left_out(folder: &Path) -> Option<String> {
+    let folder = &dances(folder).ok()?;
     let below = clips_below(folder, DEEPEST);
     let first = below.first()?;
     Some(format!(
@@ -80,7 +98,7 @@ pub(crate) fn is_clip(path: &Path) -> bool {
     path.extension().is_some_and(is_bvh) && !hidden.starts_with('.') && !path.is_dir()
 }
 
-fn entries(folder: &Path) -> Result<Vec<DirEntry>, DataError> {
+pub(super) fn entries(folder: &Path) -> Result<Vec<DirEntry>, DataError> {
     let unreadable = |source| DataError::Folder {
         folder: folder.into(),
         source,

@@ -4,6 +4,9 @@ pub mod choreography;
 pub mod config;
 pub mod dataset;
 mod folder;
+mod listed;
+#[cfg(feature = "music")]
+mod pairs;
 mod part;
 mod reading;
 mod split;

@@ -37,7 +37,7 @@ impl FileReading {
         notices.extend(set_rate(&mut clip, config.source_fps)?);
         skip_frames(&mut clip, config.skip_frames)?;
         notices.extend(oddities(&clip));
-        let Recording { mut clip } = Recording::new(clip, mapping, config)?;
+        let Recording { mut clip, .. } = Recording::new(clip, mapping, config)?;
         // What the mapping declares has been applied with it.
         let (unit, up) = match mapping {
             Some(mapping) => undeclared(mapping, config)?,
@@ -45,7 +45,7 @@ impl FileReading {
         };
         notices.extend(to_cm_and_y_up(&mut clip, unit, up));
         Ok(Self {
-            recording: Recording { clip },
+            recording: Recording::of(clip),
             notices,
         })
     }

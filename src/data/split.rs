@@ -92,6 +92,11 @@ pub(super) fn split(
             }
             (train, test)
         }
+        // Only a data folder has the file that lists them.
+        Split::MusicDance => {
+            let found = "is no folder with a split.json".to_string();
+            return Err(misfit("split = \"music_dance\"".into(), found));
+        }
         Split::Share(share) => {
             if !(*share > 0.0 && *share < 1.0) {
                 let expected = "a share above 0 and below 1";
@@ -183,6 +188,40 @@ pub(super) fn lafan1_warning(dataset: &Dataset, config: &DataConfig) -> Option<S
             "LaFAN1 has {train} training and {test} test clips of {frames} frames, this folder \
              {train_found} and {test_found} of {found}: its scores are not the benchmark's"
         )
+    })
+}
+
+/// Clips and frames of the 43 dances with music: those that train, validate and test.
+const MUSIC_DANCE: [(usize, usize); 3] = [(32, 60_749), (4, 9_160), (7, 14_341)];
+
+/// Checks clips and frames of the dances with music.
+pub(super) fn check_music_dance_frames(
+    dataset: &Dataset,
+    origin: &str,
+    config: &DataConfig,
+) -> Result<(), DataError> {
+    let parts = [&dataset.train, &dataset.validation, &dataset.test];
+    let found = parts.map(|clips| {
+        let frames = clips.iter().map(Recording::frames);
+        (clips.len(), frames.sum::<usize>())
+    });
+    if config.split != Split::MusicDance || found == MUSIC_DANCE {
+        return Ok(());
+    }
+    let said = |parts: [(usize, usize); 3]| {
+        let parts = parts.map(|(clips, frames)| format!("{clips} / {frames}"));
+        format!(
+            "{} clips / frames to train, validate and test",
+            parts.join(", ")
+        )
+    };
+    Err(DataError::Split {
+        config: format!("split = \"music_dance\", which has {}", said(MUSIC_DANCE)),
+        origin: origin.into(),
+        found: format!(
+            "gives {}; for other data, set data.split = {{ share = 0.8 }}",
+            said(found)
+        ),
     })
 }
 

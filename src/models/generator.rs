@@ -29,6 +29,8 @@ use thiserror::Error;
 
 use super::settings::ValueError;
 use crate::motion::{Clip, ContactRule, Pose, Skeleton};
+#[cfg(feature = "music")]
+use crate::music::FeatureSet;
 
 /// A pose that is given at a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +95,9 @@ pub enum NeededPoses {
     /// Frame 0 and the last frame, and no other but of the past. What lies between more keyframes
     /// is made piece by piece.
     Ends,
+    /// All of the first so many frames, a seed that the dance goes on from; key poses at any frames
+    /// after them are heeded.
+    Seed(usize),
     /// Two or more, the first at frame 0 and the last at the last frame.
     Keyframes,
 }
@@ -130,6 +135,12 @@ pub trait Generator: Send + Sync {
     /// # Errors
     /// A request that does not fit together or to the model.
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError>;
+
+    /// Which features of the music it reads where it reads music.
+    #[cfg(feature = "music")]
+    fn music_features(&self) -> FeatureSet {
+        FeatureSet::default()
+    }
 
     /// How a recording's foot in contact is told where the model is given it.
     fn contact_rule(&self) -> ContactRule {
@@ -233,6 +244,9 @@ impl Request {
             NeededPoses::Ends if !(ends && self.frames > 1 && own == 2) => {
                 return missing(format!("two poses, at frame 0 and frame {last}"));
             }
+            NeededPoses::Seed(frames) if (0..frames as i64).any(|frame| !at(frame)) => {
+                return missing(format!("the poses of the first {frames} frames"));
+            }
             NeededPoses::Keyframes if !ends => {
                 return missing(format!("poses at frame 0 and frame {last}"));
             }
@@ -245,6 +259,7 @@ impl Request {
             ("root trajectory", &self.root),
             ("velocity factors", &self.velocity_factors),
             ("contacts", &self.contacts),
+            ("music", &self.music),
         ] {
             let Some(array) = array else { continue };
             let expected = [self.frames, array.ncols()];

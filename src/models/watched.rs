@@ -39,6 +39,11 @@ impl Generator for Watched<'_> {
         self.model.needs()
     }
 
+    #[cfg(feature = "music")]
+    fn music_features(&self) -> crate::music::FeatureSet {
+        self.model.music_features()
+    }
+
     fn contact_rule(&self) -> ContactRule {
         self.model.contact_rule()
     }

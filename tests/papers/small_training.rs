@@ -121,7 +121,7 @@ pub fn dataset() -> Dataset {
         .map(|(generated, frames)| {
             let mut clip = generated.clip;
             clip.poses.truncate(frames);
-            Recording { clip }
+            Recording::of(clip)
         })
         .collect();
     let test = recordings.split_off(3);

@@ -118,7 +118,7 @@ impl InBetweening {
         recordings: &'d [Recording],
         needs: &Needs,
     ) -> Result<Vec<RecordedClip<'d>>, EvaluationError> {
-        let recorded = |Recording { clip }: &'d Recording| {
+        let recorded = |Recording { clip, .. }: &'d Recording| {
             let recorded = RecordedClip::new(&self.set, clip);
             let recorded = recorded.map_err(|missing| bad(format!("{}: {missing}", clip.name)))?;
             let measured = recorded.measured(needs, &self.features);

@@ -28,7 +28,7 @@ impl DanceClip {
         mapping: Option<&Mapping>,
         config: &DataConfig,
     ) -> Result<Self, DataError> {
-        let Recording { clip } = Recording::new(clip, mapping, config)?;
+        let Recording { clip, .. } = Recording::new(clip, mapping, config)?;
         Ok(Self::measure(clip, &config.features())?)
     }
 

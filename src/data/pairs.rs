@@ -1,0 +1,79 @@
+//! Dances with their music: pairs of files of one name.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::dataset::{DataError, Recording};
+use super::folder::entries;
+use crate::counted::counted;
+use crate::music::{Analysis, Cache, HOP};
+
+/// Folder of the sound files in a data folder; where it is not there they lie beside the dances.
+const SOUNDS: &str = "audio";
+const ENDINGS: [&str; 4] = ["wav", "flac", "mp3", "ogg"];
+
+/// The sound files of a data folder by what stands before their ending.
+///
+/// # Errors
+/// The folder cannot be read; two files of one name.
+pub(super) fn sound_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
+    let own = folder.join(SOUNDS);
+    let folder = if own.is_dir() { &own } else { folder };
+    let mut files: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for path in entries(folder)?.iter().map(std::fs::DirEntry::path) {
+        let ending = path.extension().unwrap_or_default().to_string_lossy();
+        if !ENDINGS.iter().any(|it| ending.eq_ignore_ascii_case(it)) || path.is_dir() {
+            continue;
+        }
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        if let Some(first) = files.get(&*name) {
+            return Err(DataError::TwoSounds {
+                first: first.clone(),
+                second: path,
+            });
+        }
+        files.insert(name.to_string(), path);
+    }
+    Ok(files)
+}
+
+/// What is heard in the sound file of a dance; `None` where there is none of its name.
+pub(super) fn sound_of<'f>(
+    dance: &str,
+    sounds: &'f BTreeMap<String, PathBuf>,
+) -> Option<&'f PathBuf> {
+    let stem = Path::new(dance).file_stem()?.to_string_lossy();
+    sounds.get(&*stem)
+}
+
+/// A recording with the music that is heard in a file, and what is odd about the file.
+///
+/// # Errors
+/// The file is no sound, or shorter than the dance by more than a frame.
+pub(super) fn with_music(
+    recording: Recording,
+    sound: &Path,
+    cache: &Cache,
+) -> Result<(Recording, Vec<String>), DataError> {
+    let heard = cache.analysis(sound)?;
+    let music = Arc::new(heard.analysis);
+    check_length(&recording, &music, sound)?;
+    let recording = Recording {
+        music: Some(music),
+        ..recording
+    };
+    Ok((recording, heard.warnings))
+}
+
+fn check_length(recording: &Recording, music: &Analysis, sound: &Path) -> Result<(), DataError> {
+    match music.frames() + 1 < recording.frames() {
+        false => Ok(()),
+        true => Err(DataError::ShortMusic {
+            dance: recording.name().into(),
+            frames: counted(recording.frames(), "frame"),
+            sound: sound.into(),
+            heard: counted(music.samples / HOP, "frame"),
+        }),
+    }
+}
