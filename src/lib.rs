@@ -19,7 +19,7 @@
 //! in and out, and a model used from code. A crate that needs no command line depends on a clone:
 //!
 //! ```toml
-//! [dependencies] # without "papers": the engine alone
+//! [dependencies] # without "papers": the engine alone; with "music": the engine and ears
 //! keydance = { path = "../keydance", default-features = false, features = ["papers"] }
 //! rand_chacha = "0.10" # a generator for `Initialiser`; ndarray and rand are re-exported
 //!
@@ -30,6 +30,7 @@
 //! The modules in reading order, the path of the data:
 //!
 //! - [`motion`] - BVH, skeletons, poses, kinematics, facing, contact; no learning.
+//! - [`music`] - sound files, spectra, onsets, tempo, beats; no learning.
 //! - [`data`] - files become recordings, recordings a split.
 //! - [`autograd`] - reverse-mode differentiation on a tape, and the kernels under it.
 //! - [`nn`] - layers of weights, built on the tape's operations.
@@ -59,6 +60,8 @@ pub mod evaluation;
 pub mod experiment;
 pub mod models;
 pub mod motion;
+#[cfg(feature = "music")]
+pub mod music;
 pub mod nn;
 pub mod optim;
 pub mod report;

@@ -75,6 +75,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     write("mapping", "dance_skeleton", mapping.as_bytes())?;
 
+    write("music", "two_channels.wav", &wav())?;
+
     let config = ExperimentConfig::parse(SMALL_MODEL, "the small model")?;
     let standardisation = Standardisation::fit([]);
     let mut parameters = Parameters::new();
@@ -98,4 +100,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     payload.extend(bincode::serde::encode_to_vec(&moments, format)?);
     write("state", "payload", &payload)?;
     Ok(())
+}
+
+/// A tenth of a second of two channels at 44,100 Hz.
+fn wav() -> Vec<u8> {
+    let sample = |n: i16| n.wrapping_mul(7_919).to_le_bytes();
+    let data: Vec<u8> = (0..8_820).flat_map(sample).collect();
+    let mut file = b"RIFF".to_vec();
+    file.extend((36 + data.len() as u32).to_le_bytes());
+    file.extend(b"WAVEfmt \x10\0\0\0\x01\0\x02\0");
+    file.extend(44_100u32.to_le_bytes());
+    file.extend(176_400u32.to_le_bytes());
+    file.extend(b"\x04\0\x10\0data");
+    file.extend((data.len() as u32).to_le_bytes());
+    file.extend(data);
+    file
 }

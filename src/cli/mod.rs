@@ -13,6 +13,7 @@ mod file_units;
 mod generate;
 mod gradcheck;
 mod list;
+mod music;
 mod notice;
 mod progress;
 mod reproduce;
@@ -78,6 +79,8 @@ enum Command {
     /// Write the features of every frame of a BVH file as one array
     #[command(after_help = include_str!("help/features.txt"))]
     Features(features::FeaturesArgs),
+    #[command(after_help = include_str!("help/music.txt"))]
+    Music(music::MusicArgs),
     /// Write generated dance clips as BVH files
     #[command(after_help = include_str!("help/choreography.txt"))]
     Choreography(choreography::ChoreographyArgs),
@@ -117,6 +120,7 @@ impl Cli {
             Command::Choreography(args) => choreography::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
+            Command::Music(args) => music::run(args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
             Command::BenchStep(args) => bench::step(args)?,

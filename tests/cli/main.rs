@@ -29,6 +29,7 @@ mod examples;
 mod figures;
 mod generate;
 mod help;
+mod music;
 mod odd_files;
 mod outputs;
 mod report;

@@ -24,6 +24,7 @@ mod fit;
 mod ik;
 mod learning_rate;
 mod mapping;
+mod music;
 mod resample;
 mod root_reconstruction;
 mod rotation_fit;
