@@ -19,7 +19,7 @@
 //! in and out, and a model used from code. A crate that needs no command line depends on a clone:
 //!
 //! ```toml
-//! [dependencies] # without "papers": the engine alone
+//! [dependencies] # without "papers": the engine alone; with "music": the engine and ears
 //! keydance = { path = "../keydance", default-features = false, features = ["papers"] }
 //! rand_chacha = "0.10" # a generator for `Initialiser`; ndarray and rand are re-exported
 //!

@@ -14,14 +14,15 @@ use crate::data::Dataset;
 use crate::report::figures::FigureRequest;
 use crate::run::{Subject, check_output_folder, check_outputs, replace_file};
 
-/// Draw figures 4 (b) to 12 of Pan et al. 2021 with a trained model
+/// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al.
 ///
 /// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
 /// test clip: by default the one in the middle of the first clip by name. Captions and CSV files
-/// give means over such a transition of every test clip that is long enough. A model follows a
-/// control where it gives at least a third of the change that is asked for; the captions of figures
-/// 6 to 9 say so where it does not. Motion is shown as the model predicts it, neither bent onto the
-/// keyframes nor cleaned up.
+/// give means over such a transition of every test clip that is long enough. A model of Pan et al.
+/// follows a control where it gives at least a third of the change that is asked for; the captions
+/// of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al. need the rows
+/// mix_embedding and slerp, position_loss and contact_loss beside the model. Motion is shown as the
+/// model predicts it, neither bent onto the keyframes nor cleaned up.
 #[derive(Debug, Args)]
 pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -33,7 +34,7 @@ pub struct FiguresArgs {
     /// Folder for the figures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A run to set beside in figures 11 and 12; may be repeated
+    /// A run to set beside: in figures 11 and 12 of Pan et al., 3 to 6 of Li et al.; may be repeated
     #[arg(long, value_name = "RUN_DIR_OR_CONFIG")]
     compare: Vec<PathBuf>,
     /// Test clip to show, by its file name [default: the first by name]
@@ -42,9 +43,9 @@ pub struct FiguresArgs {
     /// First keyframe in that clip [default: the transition is in its middle]
     #[arg(long, value_name = "FRAME")]
     start: Option<usize>,
-    /// Frames from keyframe to keyframe
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(2..=10_000))]
-    length: u16,
+    /// Frames from keyframe to keyframe [default: 100 for Pan et al., 30 for Li et al.]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    length: Option<u16>,
     /// Show the transition in the motion viewer, too: one HTML page
     #[arg(long, value_name = "OUT.html")]
     viewer: Option<PathBuf>,
@@ -88,7 +89,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         subject: &subject,
         compared: &compared,
         dataset: &dataset,
-        length: args.length.into(),
+        length: args.length.map(usize::from),
         clip: args.clip.as_deref(),
         start: args.start,
         page: args.viewer.is_some(),

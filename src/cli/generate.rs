@@ -81,7 +81,7 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
     subject.check_features()?;
     let needs = subject.model.needs();
-    if let NeededPoses::Past(frames) = needs.poses {
+    if let NeededPoses::Past(frames) | NeededPoses::Keyframes { past: frames @ 1.. } = needs.poses {
         let (what, poses) = (&subject.what, counted(frames, "pose"));
         anyhow::bail!("{what} dances on from {poses}; generate makes motions between keyframes");
     }
@@ -95,7 +95,7 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
-    if needs.poses == NeededPoses::Keyframes {
+    if let NeededPoses::Keyframes { .. } = needs.poses {
         return rotations::run(&args, &subject);
     }
     let data = args.units.over(&subject.config.data);

@@ -22,7 +22,11 @@ const LARGEST_FILE: u64 = 1 << 20;
 /// Most parts of a dotted key on the command line.
 const DEEPEST_KEY: usize = 16;
 /// Tables that are one thing: a layer's replaces that of the layer below.
-const WHOLE: [&str; 2] = ["data.split", "data.mapping"];
+const WHOLE: [&str; 3] = ["data.split", "data.mapping", "model.mapping"];
+/// Tables that may name a mapping file by their key `mapping`.
+const WITH_MAPPING: [&str; 2] = ["data", "model"];
+/// The table of a budget with what is over single rows: `[rows.NAME]`.
+const ROWS: &str = "rows";
 
 /// Why there is no config.
 #[derive(Debug, Error)]
@@ -50,10 +54,12 @@ impl Layer {
     /// so a config means the same wherever it is used, and whatever becomes of the file.
     fn new(origin: String, mut table: Table, folder: &Path) -> Result<Self, ConfigError> {
         let mut files = Vec::new();
-        let data = table.get_mut("data").and_then(Value::as_table_mut);
-        if let Some(value) = data.and_then(|data| data.get_mut("mapping"))
-            && let Some(path) = value.as_str()
-        {
+        for name in WITH_MAPPING {
+            let of = table.get_mut(name).and_then(Value::as_table_mut);
+            let Some(value) = of.and_then(|table| table.get_mut("mapping")) else {
+                continue;
+            };
+            let Some(path) = value.as_str() else { continue };
             let path = folder.join(path);
             let mapping = Mapping::read(&path).map_err(|error| {
                 let what_to_do = match &error {
@@ -66,7 +72,7 @@ impl Layer {
                 let cause = error.source().map(|cause| format!(": {cause}"));
                 let cause = cause.unwrap_or_default();
                 ConfigError::Refused(format!(
-                    "{origin}: data.mapping: {error}{cause}{what_to_do}"
+                    "{origin}: {name}.mapping: {error}{cause}{what_to_do}"
                 ))
             })?;
             *value = Value::try_from(mapping)?;
@@ -95,7 +101,7 @@ impl ExperimentConfig {
     }
 
     /// The same with a budget between the file and `sets`: a file of overrides that any experiment
-    /// can be under.
+    /// can be under. Its tables `[rows.NAME]` are over the experiment of this name alone.
     ///
     /// # Errors
     /// As [`ExperimentConfig::load`].
@@ -320,7 +326,14 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
             let known = kind.defaults();
             let others = registry::kinds();
             let of_others = |key: &str| others.iter().any(|it| it.defaults().contains_key(key));
+            let rows = above.remove(ROWS);
             above.retain(|key, _| known.contains_key(key) || !of_others(key));
+            let name = table.get("name").and_then(Value::as_str);
+            let name = name.unwrap_or(kind.default_name());
+            let row = rows.as_ref().and_then(|rows| rows.get(name));
+            if let Some(row) = row.and_then(Value::as_table) {
+                merge(&mut above, row, "");
+            }
         }
         kind.rename_former_keys(&mut above);
         merge(&mut table, &above, "");

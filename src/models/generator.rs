@@ -28,7 +28,7 @@ use ndarray::{Array1, Array2, Array3};
 use thiserror::Error;
 
 use super::settings::ValueError;
-use crate::motion::{Clip, ContactRule, Pose, Skeleton};
+use crate::motion::{Clip, ContactRule, Mapping, Pose, Skeleton};
 #[cfg(feature = "music")]
 use crate::music::FeatureSet;
 
@@ -98,8 +98,9 @@ pub enum NeededPoses {
     /// All of the first so many frames, a seed that the dance goes on from; key poses at any frames
     /// after them are heeded.
     Seed(usize),
-    /// Two or more, the first at frame 0 and the last at the last frame.
-    Keyframes,
+    /// Two or more, the first at frame 0 and the last at the last frame, and so many frames before
+    /// frame 0.
+    Keyframes { past: usize },
 }
 
 /// What can be given beside poses.
@@ -145,6 +146,12 @@ pub trait Generator: Send + Sync {
     /// How a recording's foot in contact is told where the model is given it.
     fn contact_rule(&self) -> ContactRule {
         ContactRule::default()
+    }
+
+    /// How it sees clips on another skeleton than its own: what it reads of a recording is measured
+    /// on what this makes of it.
+    fn mapping(&self) -> Option<&Mapping> {
+        None
     }
 
     /// [`Motion::raw`] of every request, without the rest.
@@ -238,8 +245,10 @@ impl Request {
         let ends = at(0) && at(last);
         let own = self.given.iter().filter(|given| given.frame >= 0).count();
         match needs.poses {
-            NeededPoses::Past(frames) if (1..=frames as i64).any(|before| !at(-before)) => {
-                return missing(format!("the {frames} poses before frame 0"));
+            NeededPoses::Past(past) | NeededPoses::Keyframes { past }
+                if (1..=past as i64).any(|before| !at(-before)) =>
+            {
+                return missing(format!("the {past} poses before frame 0"));
             }
             NeededPoses::Ends if !(ends && self.frames > 1 && own == 2) => {
                 return missing(format!("two poses, at frame 0 and frame {last}"));
@@ -247,7 +256,7 @@ impl Request {
             NeededPoses::Seed(frames) if (0..frames as i64).any(|frame| !at(frame)) => {
                 return missing(format!("the poses of the first {frames} frames"));
             }
-            NeededPoses::Keyframes if !ends => {
+            NeededPoses::Keyframes { .. } if !ends => {
                 return missing(format!("poses at frame 0 and frame {last}"));
             }
             _ => {}

@@ -5,8 +5,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::{
-    baselines::rotations::RotationBaseline, duan2022::Duan2022Kind, li2023::Li2023Kind,
-    transition::Kind,
+    baselines::rotations::RotationBaseline, duan2022::Duan2022Kind,
+    harvey2020::Harvey2020RotationsKind, li2023::Li2023Kind, transition::Kind,
 };
 
 /// Kinds that were [added](add) from outside.
@@ -23,6 +23,8 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(Li2023Kind),
         #[cfg(feature = "papers")]
         Arc::new(Duan2022Kind),
+        #[cfg(feature = "papers")]
+        Arc::new(Harvey2020RotationsKind),
         #[cfg(feature = "papers")]
         Arc::new(Kind::Interpolation),
         #[cfg(feature = "papers")]

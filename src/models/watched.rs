@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::generator::Needs;
 use super::{Generator, ModelError, Motion, Request};
-use crate::motion::ContactRule;
+use crate::motion::{ContactRule, Mapping};
 
 /// A model that asks before each answer whether to go on, and says how many frames it answered.
 pub struct Watched<'a> {
@@ -46,6 +46,10 @@ impl Generator for Watched<'_> {
 
     fn contact_rule(&self) -> ContactRule {
         self.model.contact_rule()
+    }
+
+    fn mapping(&self) -> Option<&Mapping> {
+        self.model.mapping()
     }
 
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {

@@ -49,6 +49,11 @@ pub enum MappingError {
     #[error("{file} gives both scale and unit; keep one")]
     ScaleAndUnit { file: String },
     #[error(
+        "{file}: no joint of the dance skeleton stands for {joint}, so there is no way back to the \
+         skeleton that has it"
+    )]
+    NoCounterpart { file: String, joint: String },
+    #[error(
         "{file}: {joint} is mapped to {source_name:?}, which {clip} does not have ({available})"
     )]
     NotInClip {
@@ -61,7 +66,7 @@ pub enum MappingError {
 }
 
 /// What errors call a mapping that a config holds.
-const IN_CONFIG: &str = "data.mapping";
+const IN_CONFIG: &str = "the mapping of the config";
 
 /// Where each of the 24 joints lies on another skeleton. A config holds what a mapping file says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -221,6 +226,29 @@ impl Mapping {
     /// Name of the file.
     pub fn file(&self) -> &str {
         &self.file
+    }
+
+    /// Whether the file declares nothing about clips but their joints.
+    pub fn keeps_units(&self) -> bool {
+        !self.has_unit && !self.has_up()
+    }
+
+    /// For each joint of another skeleton the joint of the dance skeleton that stands at its place,
+    /// `[joints]`: the first where there are several.
+    ///
+    /// # Errors
+    /// A joint of it that no joint of the dance skeleton stands for.
+    pub fn counterparts(&self, skeleton: &Skeleton) -> Result<Vec<usize>, MappingError> {
+        let counterpart = |joint: &Joint| {
+            let stands_for =
+                |source: &Source| matches!(source, Source::At(name) if *name == joint.name);
+            let found = self.sources.iter().position(stands_for);
+            found.ok_or_else(|| MappingError::NoCounterpart {
+                file: self.file.clone(),
+                joint: joint.name.clone(),
+            })
+        };
+        skeleton.joints.iter().map(counterpart).collect()
     }
 
     /// The clip on the dance skeleton, in cm and with Y up where the file declares unit and axis.

@@ -36,7 +36,7 @@ pub struct Analysis {
     pub onset_peaks: Vec<usize>,
     /// No sample is other than 0.
     pub silent: bool,
-    /// Onset strength [F], dB.
+    /// Onset strength of the F frames, dB.
     pub onset: Vec<f32>,
     /// Mel spectrum [F, 128], dB.
     pub mel: Array2<f32>,

@@ -29,7 +29,7 @@ impl Metre {
 ///
 /// A beat's accent is how loud its onset is (the most of three frames) and how much the chord
 /// changes with it (1 - the cosine of the mean chroma before and behind it), each as a z-score.
-/// `onset` [frames] and `chroma` [frames, 12] have the same frames, `beats` ascends among them.
+/// `onset` and `chroma`, frames x 12, have the same frames, `beats` ascends among them.
 #[must_use]
 pub fn metre(onset: &[f64], chroma: ArrayView2<'_, f64>, beats: &[usize]) -> Metre {
     let mut best = Metre { beats: 4, phase: 0 };

@@ -20,6 +20,7 @@ mod thousands;
 pub mod training_curves;
 pub mod viewer;
 
+pub use dancer::DrawnBody;
 pub use error::{FigureError, ReportError};
 pub use motion_figure::{MotionFigure, MotionRow, Placing, Shown};
 pub use root_panel::{PathView, RootPaths};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::FigureError;
-use super::dancer::{Drawn, GENERATED, KEYFRAME, MARKED, RECORDED};
+use super::dancer::{Drawn, DrawnBody, GENERATED, KEYFRAME, MARKED, RECORDED};
 use super::root_panel::{self, RootPaths};
 use super::svg::{Anchor, Font, Stroke, Svg, wrapped};
 use crate::motion::{JOINTS, PARTS};
@@ -19,8 +19,10 @@ const GUTTER: f64 = 14.0;
 pub struct MotionRow {
     /// What the row is, such as "Ground truth".
     pub label: String,
-    /// World positions of the joints, `[frames][24]`, cm, Y up.
-    pub frames: Vec<[DVec3; JOINTS]>,
+    /// Whose joints they are.
+    pub body: DrawnBody,
+    /// World positions of its joints, `[frames][joints]`, cm, Y up.
+    pub frames: Vec<Vec<DVec3>>,
     /// Frames that were given, drawn red and always.
     pub keyframes: Vec<usize>,
     /// Whether the frames between keyframes were generated (amber) or recorded (blue-grey).
@@ -66,15 +68,28 @@ pub struct MotionFigure {
 }
 
 impl MotionRow {
-    /// A row from the first to the last frame, which were given; nothing marked.
+    /// A row of the dance skeleton from the first to the last frame, which were given; nothing
+    /// marked.
     pub fn between_keyframes(
         label: impl Into<String>,
         frames: Vec<[DVec3; JOINTS]>,
         generated: bool,
     ) -> Self {
+        let frames = frames.into_iter().map(Vec::from).collect();
+        Self::of_body(label, DrawnBody::dance(), frames, generated)
+    }
+
+    /// The same of any skeleton; `frames`: `[frames][joints]`, cm.
+    pub fn of_body(
+        label: impl Into<String>,
+        body: DrawnBody,
+        frames: Vec<Vec<DVec3>>,
+        generated: bool,
+    ) -> Self {
         let last = frames.len().saturating_sub(1);
         Self {
             label: label.into(),
+            body,
             frames,
             keyframes: vec![0, last],
             generated,
@@ -104,7 +119,7 @@ impl MotionRow {
 struct PlacedRow<'f> {
     row: &'f MotionRow,
     shown: Vec<usize>,
-    dancers: Vec<Drawn>,
+    dancers: Vec<Drawn<'f>>,
 }
 
 /// Measures of the figure, pixels.
@@ -192,7 +207,11 @@ impl MotionFigure {
             let shown = row.shown(self.shown);
             let dancer = |&frame: &usize| {
                 let root = path.frames[frame][0];
-                Drawn::new(&row.frames[frame], DVec3::new(root.x, floor, root.z))
+                Drawn::new(
+                    &row.body,
+                    &row.frames[frame],
+                    DVec3::new(root.x, floor, root.z),
+                )
             };
             PlacedRow {
                 row,
@@ -250,9 +269,10 @@ impl MotionFigure {
             svg.text([x + 12.0, 53.0], name, font);
             x += 40.0 + 7.0 * name.len() as f64;
         }
-        if any(|row| row.paths.is_some()) {
+        let paths = self.rows.iter().find_map(|row| row.paths.as_ref());
+        if let Some(paths) = paths {
             for (colour, name, dash) in [
-                (root_panel::TARGET, "root asked for", "4 3"),
+                (root_panel::TARGET, paths.target_label, "4 3"),
                 (root_panel::GENERATED, "root generated", ""),
             ] {
                 let stroke = Stroke {

@@ -29,6 +29,8 @@ pub enum PathView {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RootPaths {
     pub view: PathView,
+    /// What the target is, such as "root asked for".
+    pub target_label: &'static str,
     pub target: Vec<DVec3>,
     pub generated: Vec<DVec3>,
 }

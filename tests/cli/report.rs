@@ -234,6 +234,7 @@ fn root_trajectories_share_a_scale_and_the_caption_stands_under_the_figure() {
     for (row, reach) in figure.rows.iter_mut().zip([1.0, 1.0, 0.5]) {
         row.paths = Some(RootPaths {
             view: PathView::Above,
+            target_label: "root asked for",
             target: target.clone(),
             generated: target.iter().map(|place| *place * reach).collect(),
         });

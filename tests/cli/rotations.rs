@@ -215,3 +215,98 @@ fn what_cannot_be_completed_is_said_and_nothing_is_written() {
     ));
     assert!(!out.exists());
 }
+
+#[test]
+fn figures_compare_the_methods_and_show_what_contacts_do() {
+    let folder = TempDir::new().unwrap();
+    let config = |name: &str, kind: &str| {
+        let path = folder.path().join(format!("{name}.toml"));
+        let split = "[data]\nsplit = { share = 0.8 }";
+        let text =
+            format!("name = '{name}'\npaper = 'li2023'\n{split}\n[model]\nkind = '{kind}'\n");
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let out = folder.path().join("figures");
+    let figures = |out: &Path| {
+        let mut command = keydance("figures");
+        command.arg(FIXTURE.path("li"));
+        command.arg("--data").arg(FIXTURE.path("data"));
+        command.arg("--out").arg(out);
+        command
+    };
+    let mut command = figures(&out);
+    let others = [
+        config("mix_embedding", "held_pose"),
+        config("slerp", "slerp"),
+        FIXTURE.path("duan"),
+    ];
+    for other in &others {
+        command.arg("--compare").arg(other);
+    }
+    command.assert().success();
+    let mut names: Vec<String> = fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".svg"))
+        .collect();
+    names.sort();
+    let expected = [10, 3, 5, 6, 7, 8, 9].map(|number| format!("figure_{number}.svg"));
+    assert_eq!(names, expected);
+    let numbers =
+        |figure: &str| fs::read_to_string(out.join(figure).with_extension("csv")).unwrap();
+    // The ablations stand in figure 3 alone.
+    for (row, three, five) in [("duan", false, true), ("with E_m", true, false)] {
+        assert_eq!(numbers("figure_3").contains(row), three, "{row}");
+        assert_eq!(numbers("figure_5").contains(row), five, "{row}");
+    }
+    let value = |figure: &str, row: &str, measure: &str| -> f64 {
+        let text = numbers(figure);
+        let mut lines = csv::Reader::from_reader(text.as_bytes());
+        let mut lines = lines.records().map(Result::unwrap);
+        let line = lines.find(|line| &line[0] == row && &line[1] == measure);
+        line.unwrap()[4].parse().unwrap()
+    };
+    // The foot that its contact decoder names stands.
+    let [own, interpolated] =
+        ["li", "Interpolation"].map(|row| value("figure_6", row, "contact_foot_speed_all_windows"));
+    assert!(own < 1e-3 && interpolated > 0.05, "{own}, {interpolated}");
+
+    let never = folder.path().join("never");
+    let refused = |more: &[&str], message: &str| {
+        let output = figures(&never).args(more).assert().failure();
+        output.stderr(contains(message));
+        assert!(!never.exists());
+    };
+    refused(&["--clip", "nobody.bvh"], "--clip nobody.bvh is not among");
+    refused(&["--start", "9999"], "--start 9999");
+    refused(&["--length", "400"], "no test clip has the 401 frames");
+    refused(
+        &["--length", "60"],
+        "the longest that it was trained on is 49",
+    );
+}
+
+#[test]
+fn a_batch_of_each_model_is_exported_with_its_losses() {
+    let folder = TempDir::new().unwrap();
+    for run in ["li", "duan"] {
+        let out = folder.path().join(run);
+        let mut command = keydance("export-batch");
+        command.arg(FIXTURE.path(run));
+        command.arg("--data").arg(FIXTURE.path("data"));
+        command.args(["--frames", "12", "--windows", "3"]);
+        command.arg("--out").arg(&out);
+        command.assert().success();
+        let batch = fs::read(&out).unwrap();
+        let header = String::from_utf8_lossy(&batch[..batch.len().min(1 << 16)]).into_owned();
+        for name in [
+            "truth.rotations",
+            "output.rotations",
+            "loss.total",
+            "gradient.",
+        ] {
+            assert!(header.contains(name), "{run}: {name}");
+        }
+    }
+}

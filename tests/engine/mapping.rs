@@ -9,6 +9,7 @@ use keydance::motion::bvh::{self, Axis, Bvh, channel_layout};
 use keydance::motion::{DANCE_JOINTS, Mapping, resample};
 
 use crate::dance_clip::turning_clip;
+use crate::lafan1_data::lafan1_folder;
 use crate::martial_data;
 
 /// A mapping of the dance skeleton on itself, with some lines in place of others.
@@ -196,7 +197,7 @@ fn a_config_holds_all_that_a_mapping_file_says() {
     let lacking = toml::from_str::<Mapping>(&text.replace("Head =", "Tail ="));
     let message = lacking.unwrap_err().to_string();
     assert!(
-        message.contains("data.mapping: [joints] names Tail"),
+        message.contains("the mapping of the config: [joints] names Tail"),
         "{message}"
     );
 }
@@ -232,4 +233,43 @@ fn martial_arts_clips_go_through_the_pipeline() {
             assert!(found[3].distance(positions[foot]) < 1e-9 && found[4].distance(toe) < 1e-9);
         }
     }
+}
+
+#[test]
+fn the_way_back_from_the_24_joints_is_where_lafan1s_joints_are() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/mappings/lafan1.toml");
+    let mapping = Mapping::read(&path).unwrap();
+    let Some(folder) = lafan1_folder() else {
+        return;
+    };
+    let document = bvh::read(&folder.join("walk1_subject1.bvh")).unwrap();
+    let mut clip = document.to_clip();
+    clip.poses.truncate(20);
+    let counterparts = mapping.counterparts(&clip.skeleton).unwrap();
+    assert_eq!(counterparts.len(), 22);
+    let mapped = mapping.apply(&clip).unwrap();
+    for (own, pose) in clip.poses.iter().zip(&mapped.poses) {
+        let (own, seen) = (
+            own.world_positions(&clip.skeleton),
+            pose.world_positions(&mapped.skeleton),
+        );
+        for (position, &at) in own.iter().zip(&counterparts) {
+            assert!(position.distance(seen[at]) < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_nothing_stands_for_has_no_way_back() {
+    let clip = bent_clip();
+    let changed = [("Head", "\"Neck\"")];
+    let mapping = Mapping::parse(&mapping("", &changed), "map.toml").unwrap();
+    let error = mapping
+        .counterparts(&clip.skeleton)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("map.toml: no joint of the dance skeleton stands for Head"),
+        "{error}"
+    );
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use keydance::data::Split;
 use keydance::experiment::ExperimentConfig;
-use keydance::models::transition::TransitionSettings;
+use keydance::models::transition::{ModelConfig, TransitionSettings};
 
 fn settings(config: &ExperimentConfig) -> &TransitionSettings {
     TransitionSettings::of(config).unwrap()
@@ -252,4 +252,43 @@ fn differences_name_the_key_and_both_values() {
     let other = load(&[("a.toml", "schedule.fraction = 0.5")], &[]).unwrap();
     let found = ExperimentConfig::default().differences(&other).unwrap();
     assert_eq!(found, ["schedule.fraction: 1.0, 0.5"]);
+}
+
+#[test]
+fn a_budgets_table_of_a_row_is_over_the_experiment_of_that_name_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let budget = file(
+        "b.toml",
+        "schedule.batch_size = 32\n[rows.pan]\nschedule.batch_size = 16\nmodel.loss.key = 2\n\
+         [rows.other]\nschedule.batch_size = 8",
+    );
+    let of = |name: &str| {
+        let config = file("a.toml", &format!("name = '{name}'"));
+        ExperimentConfig::load_under(&config, Some(&budget), &[])
+    };
+    let keys = |name: &str| {
+        let config = of(name).unwrap();
+        let own = settings(&config);
+        let ModelConfig::Pan2021(model) = &own.model else {
+            panic!("not the default kind");
+        };
+        (own.schedule.batch_size, model.loss.key)
+    };
+    let default = keys("any").1;
+    assert_eq!(keys("any"), (32, default));
+    assert_eq!(keys("pan"), (16, 2.0));
+    assert_eq!(keys("other"), (8, default));
+
+    fs::write(&budget, "[rows.pan]\nschedule.bach_size = 16").unwrap();
+    assert_eq!(keys("any"), (128, default));
+    let error = of("pan").unwrap_err().to_string();
+    assert!(
+        error.contains("b.toml: unknown") && error.contains("bach_size"),
+        "{error}"
+    );
 }

@@ -12,7 +12,7 @@ use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{Dataset, Split};
 use keydance::experiment::ExperimentConfig;
-use keydance::models::harvey2020::{Harvey2020, Harvey2020Config};
+use keydance::models::harvey2020::{Harvey2020, Harvey2020Config, RecurrentConfig};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
 use keydance::models::transition::Standardisation;
@@ -43,7 +43,10 @@ fn adversarial() -> Harvey2020Config {
 
 fn without_critics() -> Harvey2020Config {
     Harvey2020Config {
-        adversarial: false,
+        network: RecurrentConfig {
+            adversarial: false,
+            ..RecurrentConfig::default()
+        },
         ..adversarial()
     }
 }
@@ -126,7 +129,7 @@ fn the_gradients_of_network_and_critics_are_those_of_central_differences_of_thei
             assert!(50 * report.kinks() <= report.compared(), "{case:?}");
             let critics = |name: &str| name.starts_with("critics.");
             let checked = report.parameters.iter().filter(|p| critics(&p.parameter));
-            assert_eq!(checked.count() > 0, config.adversarial);
+            assert_eq!(checked.count() > 0, config.network.adversarial);
         }
     }
 }
@@ -495,10 +498,13 @@ fn forward_kinematics_on_the_tape_are_those_of_the_clips() {
 fn the_network_learns_one_window_by_heart() {
     let (batch, standardisation) = generated_batch(10, 1, 29).unwrap();
     let config = Harvey2020Config {
-        hidden: 64,
-        code: 32,
-        recurrent: 64,
-        target_noise: 0.0,
+        network: RecurrentConfig {
+            hidden: 64,
+            code: 32,
+            recurrent: 64,
+            target_noise: 0.0,
+            ..RecurrentConfig::default()
+        },
         ..adversarial()
     };
     let mut built: Built<f64> = build(&config, &standardisation);

@@ -24,6 +24,7 @@ mod harvey2020;
 mod in_betweening;
 mod interpolation;
 mod li2023;
+mod mapped_model;
 mod metrics;
 mod pan2021;
 mod preferred;

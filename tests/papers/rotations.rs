@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataPart, Dataset, Window};
 use keydance::experiment::ExperimentConfig;
-use keydance::models::generator::{Given, Request};
+use keydance::models::generator::{Given, NeededPoses, Request};
 use keydance::models::rotations::{LengthConfig, Schedule, ScheduleConfig};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::{ModelError, Streams};
@@ -23,6 +24,10 @@ const LI: &str = "name = 'li'\ndata.split = { share = 0.7 }\n\
 const DUAN: &str = "name = 'duan'\ndata.split = { share = 0.7 }\n\
     [model]\nkind = 'duan2022'\nwidth = 8\nheads = 2\nlayers = 1\nfeed_forward = 8\n\
     [schedule]\nfraction = 0.002\nbatch_size = 5\n[checkpoint]\nevery_steps = 3\n";
+/// With critics, and a past before the first keyframe.
+const HARVEY: &str = "name = 'harvey'\ndata.split = { share = 0.7 }\n\
+    [model]\nkind = 'harvey2020_rotations'\npast = 3\nhidden = 8\ncode = 8\nrecurrent = 8\n\
+    [schedule]\nfraction = 0.002\nbatch_size = 5\nshards = 2\n[checkpoint]\nevery_steps = 3\n";
 
 fn dataset(config: &ExperimentConfig) -> Dataset {
     let choreography = ChoreographyConfig {
@@ -44,7 +49,7 @@ fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, stop: u64) -> Outco
 
 #[test]
 fn a_training_that_was_stopped_ends_at_the_same_bits_on_any_number_of_threads() {
-    for text in [LI, DUAN] {
+    for text in [LI, DUAN, HARVEY] {
         let config = ExperimentConfig::parse(text, "test").unwrap();
         let data = dataset(&config);
         let mut whole = Trainer::new(config.clone(), &data, 1).unwrap();
@@ -114,7 +119,7 @@ fn every_epoch_trains_each_window_once_at_a_length_drawn_for_the_batch() {
         batch_size: 4,
         ..ScheduleConfig::default()
     };
-    let schedule = Schedule::new(&[40, 19, 33], &config, Streams::new(1));
+    let schedule = Schedule::new(&[40, 19, 33], 0, &config, Streams::new(1));
     // 0, 5, .. 20 of the first clip, 0, 5, 10 of the last.
     assert_eq!(schedule.windows().len(), 8);
     assert_eq!((schedule.steps(), schedule.whole_steps()), (6, 6));
@@ -242,4 +247,92 @@ fn what_a_request_lacks_is_named() {
     assert!(wrong.contains("23 joints"), "{wrong}");
     let wrong = text(&|it| it.given[1].pose.rotations.truncate(23));
     assert!(wrong.contains("the pose at frame 30"), "{wrong}");
+}
+
+/// The request for two keyframes of a test clip with the three frames before the first.
+fn request_with_past(data: &Dataset, start: usize, end: usize) -> Request {
+    let clip = &DataPart::Test.of(data).unwrap()[0].clip;
+    let mut request = request(data, &[start, end]);
+    let past = (1..=3).rev().map(|before| Given {
+        frame: -(before as i64),
+        pose: clip.poses[start - before].clone(),
+        features: None,
+    });
+    request.given.splice(0..0, past);
+    request
+}
+
+#[test]
+fn a_model_with_a_past_heeds_it_and_goes_to_one_keyframe() {
+    let config = ExperimentConfig::parse(HARVEY, "test").unwrap();
+    let data = dataset(&config);
+    let trainer = Trainer::new(config, &data, 1).unwrap();
+    let model = trainer.model();
+    let past = NeededPoses::Keyframes { past: 3 };
+    assert_eq!(model.needs().poses, past);
+    let asked = request_with_past(&data, 20, 40);
+    let refused = |request: Request| model.generate(&[request]).unwrap_err().to_string();
+    let bare = refused(request(&data, &[20, 40]));
+    assert_eq!(bare, "harvey needs the 3 poses before frame 0");
+    let mut two = asked.clone();
+    let mut middle = two.given[3].clone();
+    middle.frame = 10;
+    two.given.insert(4, middle);
+    let text = refused(two);
+    assert!(
+        text.contains("goes on from 3 poses to one keyframe"),
+        "{text}"
+    );
+    let mut short = asked.clone();
+    short.given[0].pose.rotations.pop();
+    let text = refused(short);
+    assert!(text.contains("the pose at frame -3"), "{text}");
+
+    let mut still = asked.clone();
+    let start = still.given[3].pose.clone();
+    still.given[..3]
+        .iter_mut()
+        .for_each(|it| it.pose = start.clone());
+    let motions = model.generate(&[asked.clone(), still]).unwrap();
+    let poses = |k: usize| motions[k].poses.clone().unwrap();
+    assert_ne!(poses(0)[10].rotations, poses(1)[10].rotations);
+    for (frame, given) in [(0, &asked.given[3]), (20, &asked.given[4])] {
+        assert_eq!(poses(0)[frame].rotations, given.pose.rotations);
+        assert_eq!(poses(0)[frame].translations[0], given.pose.translations[0]);
+    }
+}
+
+#[test]
+fn windows_whose_past_would_lie_before_their_clip_are_not_trained() {
+    let config = ScheduleConfig::default();
+    let windows = |past: usize| {
+        let schedule = Schedule::new(&[90, 59, 50], past, &config, Streams::new(1));
+        let windows = schedule.windows().iter();
+        windows.map(|it| (it.clip, it.start)).collect::<Vec<_>>()
+    };
+    let all: Vec<_> = [0, 10, 20, 30, 40].map(|start| (0, start)).into();
+    assert_eq!(windows(0), [all.clone(), vec![(1, 0), (2, 0)]].concat());
+    assert_eq!(windows(9), all[1..]);
+}
+
+#[test]
+fn a_turn_of_the_dance_turns_what_a_model_that_faces_the_keyframe_makes() {
+    let config = ExperimentConfig::parse(HARVEY, "test").unwrap();
+    let data = dataset(&config);
+    let trainer = Trainer::new(config, &data, 1).unwrap();
+    let asked = request_with_past(&data, 20, 40);
+    let turn = DQuat::from_rotation_y(1.1);
+    let mut turned = asked.clone();
+    for given in &mut turned.given {
+        given.pose.rotations[0] = turn * given.pose.rotations[0];
+        given.pose.translations[0] = turn * given.pose.translations[0] + DVec3::X;
+    }
+    let motions = trainer.model().generate(&[asked, turned]).unwrap();
+    let [poses, turned] = [0, 1].map(|k| motions[k].poses.as_ref().unwrap());
+    for (pose, turned) in poses.iter().zip(turned) {
+        let place = turn * pose.translations[0] + DVec3::X;
+        // The network computes in f32, with roots of some 100 cm.
+        assert!(place.distance(turned.translations[0]) < 1e-3);
+        assert!((turn * pose.rotations[0]).dot(turned.rotations[0]).abs() > 1.0 - 1e-6);
+    }
 }

@@ -13,14 +13,16 @@ mod posed;
 mod recorded;
 mod scores;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::protocol::{Evaluation, EvaluationError, EvaluationOptions, Protocol};
 use super::windows::{CHUNK, answers, bad, failed, in_chunks, left_out, spread};
 use super::{Metric, Scores};
 use crate::data::{DataConfig, DataPart, Dataset, Recording, Window, WindowCut};
-use crate::models::Generator;
-use crate::models::generator::{Needs, Request};
+use crate::models::generator::{NeededPoses, Request};
+use crate::models::{Generator, ModelError};
 use crate::motion::{Clip, FeatureConfig, Skeleton};
 use answer::Answer;
 use data_set::DataSet;
@@ -116,12 +118,12 @@ impl InBetweening {
     fn recorded<'d>(
         &self,
         recordings: &'d [Recording],
-        needs: &Needs,
+        model: &dyn Generator,
     ) -> Result<Vec<RecordedClip<'d>>, EvaluationError> {
         let recorded = |Recording { clip, .. }: &'d Recording| {
             let recorded = RecordedClip::new(&self.set, clip);
             let recorded = recorded.map_err(|missing| bad(format!("{}: {missing}", clip.name)))?;
-            let measured = recorded.measured(needs, &self.features);
+            let measured = recorded.measured(model, &self.features);
             measured.map_err(|error| bad(error.to_string()))
         };
         let clips: Vec<_> = recordings.par_iter().map(recorded).collect();
@@ -169,6 +171,32 @@ impl InBetweening {
     }
 }
 
+/// What a model is asked about frames of a clip, as the protocol asks: the poses of the first and
+/// the last, the past before them and what else the model reads of the recording; `config` is how
+/// that is measured. The clip must have the frames.
+///
+/// # Errors
+/// The clip lacks a joint, or cannot be measured.
+pub fn window_question(
+    model: &dyn Generator,
+    clip: &Clip,
+    frames: Range<usize>,
+    config: &FeatureConfig,
+) -> Result<Request, ModelError> {
+    let recorded = RecordedClip::new(&DataSet::DANCE, clip);
+    let recorded = recorded.map_err(|missing| ModelError::data(&missing))?;
+    let recorded = recorded.measured(model, config)?;
+    let (start, needs) = (frames.start, model.needs());
+    let (rule, threshold) = (model.contact_rule(), config.contact_threshold);
+    let contacts = recorded.labels(start, frames.len(), rule, threshold);
+    let past = match needs.poses {
+        NeededPoses::Past(past) | NeededPoses::Keyframes { past } => past,
+        NeededPoses::None | NeededPoses::Ends | NeededPoses::Seed(_) => 0,
+    };
+    let first = start.saturating_sub(past);
+    Ok(recorded.request(first, start, &contacts, &needs))
+}
+
 impl Protocol for InBetweening {
     fn name(&self) -> &'static str {
         "in_betweening"
@@ -214,7 +242,7 @@ impl Protocol for InBetweening {
                 longest: clip_frames.iter().copied().max().unwrap_or(0),
             });
         }
-        let clips = self.recorded(recordings, &subject.needs())?;
+        let clips = self.recorded(recordings, subject)?;
         let deviations = self.deviations(data)?;
         let (mut sums, mut warnings) = (Vec::new(), Vec::new());
         for &length in &self.lengths {

@@ -140,7 +140,7 @@ impl Generator for RotationBaseline {
 
     fn needs(&self) -> Needs {
         Needs {
-            poses: NeededPoses::Keyframes,
+            poses: NeededPoses::Keyframes { past: 0 },
             conditions: &[],
             heeds: &[],
         }

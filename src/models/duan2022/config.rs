@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Duan2022;
 use crate::autograd::Real;
+use crate::data::DataConfig;
 use crate::models::ModelError;
 use crate::models::rotations::{
     AugmentationConfig, Body, RotationNetwork, RotationSettings, ScheduleConfig, WindowStatistics,
@@ -75,7 +76,7 @@ impl RotationSettings for Duan2022Settings {
         ContactRule::LowerAnkle
     }
 
-    fn check_own(&self) -> Result<(), ValueError> {
+    fn check_own(&self, _data: &DataConfig) -> Result<(), ValueError> {
         let Duan2022Config {
             width,
             layers,

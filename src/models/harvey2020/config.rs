@@ -1,4 +1,4 @@
-//! Sizes of the network, its noise and its losses.
+//! Sizes of the recurrent network, its noise and its losses.
 
 use std::fmt;
 
@@ -30,10 +30,11 @@ impl Default for HarveyLossWeights {
     }
 }
 
-/// The network of Harvey et al. 2020; the defaults are that paper's.
+/// The network of Harvey et al. 2020; the defaults are that paper's. A config has these keys beside
+/// those of what the network is trained on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Harvey2020Config {
+#[serde(default)]
+pub struct RecurrentConfig {
     /// Whether the two critics are trained with the network.
     pub adversarial: bool,
     /// First hidden layer of encoders, decoder and critics.
@@ -50,13 +51,10 @@ pub struct Harvey2020Config {
     pub noise_from: usize,
     /// Frames before the target from which on the target noise is whole.
     pub noise_whole: usize,
-    /// Standard deviation of the Gaussian that smooths the facing direction of predicted frames,
-    /// frames: as `data.facing_sigma`.
-    pub facing_sigma: f64,
     pub loss: HarveyLossWeights,
 }
 
-impl Default for Harvey2020Config {
+impl Default for RecurrentConfig {
     fn default() -> Self {
         Self {
             adversarial: true,
@@ -67,13 +65,12 @@ impl Default for Harvey2020Config {
             target_noise: 0.5,
             noise_from: 5,
             noise_whole: 30,
-            facing_sigma: 20.0,
             loss: HarveyLossWeights::default(),
         }
     }
 }
 
-impl Harvey2020Config {
+impl RecurrentConfig {
     /// The same structure in small sizes (8 units a layer), for checks in f64.
     pub fn small(&self) -> Self {
         Self {
@@ -116,12 +113,6 @@ impl Harvey2020Config {
             "noise_from",
             &self.noise_from,
             &format!("less than model.noise_whole = {}", self.noise_whole),
-        )?;
-        require(
-            self.facing_sigma > 0.0 && self.facing_sigma <= 10_000.0,
-            "facing_sigma",
-            &self.facing_sigma,
-            "a number of frames above 0 and at most 10000",
         )?;
         let loss = self.loss;
         for (key, value) in [

@@ -2,14 +2,17 @@
 
 use rand::Rng;
 
-use super::config::Harvey2020Config;
+use super::config::RecurrentConfig;
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::CRITICS;
 use crate::nn::{Activation, Initialiser, LastLayer, Mlp};
 
-/// Numbers of a frame that a critic sees: 23 joints relative to the root and the velocities of all
-/// 24.
-pub(super) const SEEN: usize = 69 + 72;
+/// Numbers of a frame that a critic sees: J - 1 joints relative to the root and the velocities of
+/// all J.
+fn seen(joints: usize) -> usize {
+    3 * (joints - 1) + 3 * joints
+}
+
 /// Names, and frames that each critic sees at once.
 const CRITICS_OF_THE_PAPER: [(&str, usize); 2] = [("short", 2), ("long", 10)];
 
@@ -33,12 +36,13 @@ pub(super) struct Judgement {
 impl Critic {
     pub(super) fn both<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
-        config: &Harvey2020Config,
+        config: &RecurrentConfig,
+        joints: usize,
     ) -> Vec<Self> {
         CRITICS_OF_THE_PAPER
             .iter()
             .map(|&(name, frames)| {
-                let sizes = [frames * SEEN, config.hidden, config.code, 1];
+                let sizes = [frames * seen(joints), config.hidden, config.code, 1];
                 let name = format!("{CRITICS}{name}");
                 let layers =
                     Mlp::with_activation(init, &name, &sizes, Activation::Relu, LastLayer::Linear);
@@ -47,8 +51,8 @@ impl Critic {
             .collect()
     }
 
-    /// Windows of frames in a row, `[(N - frames + 1) * windows, frames * 141]`, from `seen [N *
-    /// windows, 141]`.
+    /// Windows of frames in a row, `[(N - frames + 1) * windows, frames * n]`, from the n numbers
+    /// of each frame, `[N * windows, n]`.
     fn slide<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
@@ -77,7 +81,7 @@ impl Critic {
     }
 }
 
-/// Judges `predicted [N * windows, 141]` beside `recorded`, as a mean over positions in time and
+/// Judges `predicted [N * windows, n]` beside `recorded`, as a mean over positions in time and
 /// over `total_windows`. A critic that sees more than N frames has no say.
 pub(super) fn judge<T: Real>(
     tape: &mut Tape<'_, T>,

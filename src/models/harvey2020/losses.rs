@@ -1,28 +1,32 @@
 //! The losses: mean absolute differences from the recorded motion, and what the critics add.
 
-use super::config::Harvey2020Config;
+use super::config::RecurrentConfig;
 use super::critic::{Critic, judge};
-use super::given::GivenWindows;
+use super::given::{GivenWindows, Recorded};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::LossTerms;
-use crate::models::transition::pose_windows::{OFFSETS, ROTATIONS};
-use crate::motion::{DANCE_PARENTS, JOINTS};
 
 /// The unit of differences of quaternions: from k1 on, they change by about this where joints move
 /// by s_p (the mean over windows of 5 to 70 frames of the dance data's training clips).
 const QUATERNION_UNIT: f64 = 0.07;
 
-/// s_p (cm) and s_v (cm/frame), the scales of p^b and v^b.
+/// Units of the network's numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scales {
-    pub(super) position: f64,
-    pub(super) velocity: f64,
+    /// s_p, of joints' positions, cm.
+    pub position: f64,
+    /// s_v, of joints' velocities, cm/frame.
+    pub velocity: f64,
+    /// Of the root's offset to the target, cm.
+    pub root: f64,
+    /// Of the root's velocity, cm/frame.
+    pub root_velocity: f64,
 }
 
 /// Frames k1 .. k2 on the tape, in the windows' frames: `[windows, ..]` each, k1 as recorded.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PredictedFrames {
-    /// `[windows, 96]`
+    /// `[windows, 4 J]`
     pub(super) rotations: Vec<Var>,
     /// `[windows, 3]`, cm
     pub(super) roots: Vec<Var>,
@@ -35,9 +39,9 @@ struct Frames {
     rotations: Var,
     roots: Var,
     contacts: Var,
-    /// Joints relative to the root, `[rows, 72]`, cm.
+    /// Joints relative to the root, `[rows, 3 J]`, cm.
     relative: Var,
-    /// Joints where the root is, `[rows, 72]`, cm.
+    /// Joints where the root is, `[rows, 3 J]`, cm.
     placed: Var,
 }
 
@@ -45,19 +49,20 @@ impl Frames {
     fn new<T: Real>(
         tape: &mut Tape<'_, T>,
         motion: &PredictedFrames,
-        given: &GivenWindows<'_, T>,
+        given: &GivenWindows<T>,
     ) -> Result<Self, AutogradError> {
         let rows = motion.roots.len() * given.windows;
         let mut flat = |parts: &[Var], columns: usize| {
             let stacked = tape.stack(parts)?;
             tape.reshape(stacked, &[rows, columns])
         };
-        let rotations = flat(&motion.rotations, ROTATIONS)?;
+        let joint_count = given.parents.len();
+        let rotations = flat(&motion.rotations, 4 * joint_count)?;
         let roots = flat(&motion.roots, 3)?;
         let contacts = flat(&motion.contacts, 4)?;
         let relative = joints(tape, given, rotations)?;
         let (joints, root) = (
-            tape.reshape(relative, &[rows, JOINTS, 3])?,
+            tape.reshape(relative, &[rows, joint_count, 3])?,
             tape.reshape(roots, &[rows, 1, 3])?,
         );
         let placed = tape.add(joints, root)?;
@@ -66,21 +71,21 @@ impl Frames {
             roots,
             contacts,
             relative,
-            placed: tape.reshape(placed, &[rows, 3 * JOINTS])?,
+            placed: tape.reshape(placed, &[rows, 3 * joint_count])?,
         })
     }
 
-    /// What the critics see of frames k1 + 1 .. k2, `[N * windows, 141]`: joints relative to the
-    /// root in units of s_p, velocities in units of s_v.
+    /// What the critics see of frames k1 + 1 .. k2, `[N * windows, 6 J - 3]`: joints relative to
+    /// the root in units of s_p, velocities in units of s_v.
     fn seen<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
         windows: usize,
         scales: Scales,
     ) -> Result<Var, AutogradError> {
-        let rows = tape.shape(self.relative)[0];
+        let (rows, columns) = (tape.shape(self.relative)[0], tape.shape(self.relative)[1]);
         let joints = tape.rows(self.relative, windows..rows)?;
-        let joints = tape.columns(joints, 3..3 * JOINTS)?;
+        let joints = tape.columns(joints, 3..columns)?;
         let joints = tape.affine(joints, 1.0 / scales.position, 0.0);
         let now = tape.rows(self.placed, windows..rows)?;
         let before = tape.rows(self.placed, 0..rows - windows)?;
@@ -90,18 +95,15 @@ impl Frames {
     }
 }
 
-/// Forward kinematics of `rotations [n * windows, 96]`: joints relative to the root,
-/// `[n * windows, 72]`, cm.
+/// Forward kinematics of `rotations [n * windows, 4 J]`: joints relative to the root,
+/// `[n * windows, 3 J]`, cm.
 pub(super) fn joints<T: Real>(
     tape: &mut Tape<'_, T>,
-    given: &GivenWindows<'_, T>,
+    given: &GivenWindows<T>,
     rotations: Var,
 ) -> Result<Var, AutogradError> {
-    let offsets = tape.constant_with(&[given.windows, OFFSETS], |out| {
-        let offsets = given.poses.offsets.iter();
-        out.iter_mut().zip(offsets).for_each(|(out, &x)| *out = x);
-    });
-    tape.forward_kinematics(rotations, offsets, &DANCE_PARENTS)
+    let offsets = constant(tape, given.windows, &given.offsets);
+    tape.forward_kinematics(rotations, offsets, &given.parents)
 }
 
 /// A constant `[windows, columns]`.
@@ -111,38 +113,41 @@ pub(super) fn constant<T: Real>(tape: &mut Tape<'_, T>, windows: usize, values: 
 }
 
 /// The recorded motion.
-fn recorded<T: Real>(tape: &mut Tape<'_, T>, given: &GivenWindows<'_, T>) -> PredictedFrames {
-    let mut frames = |of: &dyn Fn(usize) -> Vec<T>| -> Vec<Var> {
-        (0..=given.transition)
-            .map(|row| constant(tape, given.windows, &of(row)))
+pub(super) fn recorded<T: Real>(
+    tape: &mut Tape<'_, T>,
+    recorded: &Recorded<T>,
+    windows: usize,
+) -> PredictedFrames {
+    let mut frames = |of: &[Vec<T>]| -> Vec<Var> {
+        of.iter()
+            .map(|numbers| constant(tape, windows, numbers))
             .collect()
     };
     PredictedFrames {
-        rotations: frames(&|row| given.rotations(row)),
-        roots: frames(&|row| given.roots(row)),
-        contacts: frames(&|row| given.contacts(row)),
+        rotations: frames(&recorded.rotations),
+        roots: frames(&recorded.roots),
+        contacts: frames(&recorded.contacts),
     }
 }
 
 /// All terms of a predicted motion; `total_windows` as in [`crate::models::transition::Batch`].
 ///
-/// - quaternion: mean of |q~ - q| over the 96 numbers, in units of 0.07;
+/// - quaternion: mean of |q~ - q| over the 4 J numbers, in units of 0.07;
 /// - root: mean of |r~ - r| over the 3 numbers, in units of s_p;
-/// - position: mean of |p~ - p| over the 72 numbers of all joints with the root where it is, in
+/// - position: mean of |p~ - p| over the 3 J numbers of all joints with the root where it is, in
 ///   units of s_p;
 /// - contact: mean of |c~ - c| over the 4 labels;
 /// - adversarial, critics: see [`super::critic::Judgement`], with critics only.
 pub(super) fn terms<T: Real>(
     tape: &mut Tape<'_, T>,
-    config: &Harvey2020Config,
+    config: &RecurrentConfig,
     scales: Scales,
     critics: &[Critic],
-    given: &GivenWindows<'_, T>,
-    predicted: &PredictedFrames,
+    given: &GivenWindows<T>,
+    [predicted, recorded]: [&PredictedFrames; 2],
     total_windows: usize,
 ) -> Result<LossTerms, AutogradError> {
-    let recorded = recorded(tape, given);
-    let recorded = Frames::new(tape, &recorded, given)?;
+    let recorded = Frames::new(tape, recorded, given)?;
     let predicted = Frames::new(tape, predicted, given)?;
     let frames = given.transition * total_windows;
     // Keyframe k1 stands on both sides and adds nothing.

@@ -1,11 +1,12 @@
 //! Robust Motion In-betweening (Harvey et al. 2020, ACM TOG 39(4)): the recurrent baseline without
 //! root-trajectory control.
 //!
-//! - `config`: sizes and weights;
-//! - `given`: the windows of a batch in the frame of keyframe k1;
-//! - `network`: encoders, LSTM and decoder, one frame after the other;
-//! - `losses`: reconstruction, and what the critics add;
-//! - `critic`: the two sliding critics.
+//! - `network`: encoders, LSTM and decoder, one frame after the other, with sizes and weights in
+//!   `config`;
+//! - `losses`: reconstruction, and what the two sliding critics of `critic` add;
+//! - `given`: windows in the frame of keyframe k1;
+//! - `transitions`, `transition_windows`: on transitions of the dance skeleton, beside Pan et al.;
+//! - `rotations`: on windows of rotations of any skeleton, beside Li et al.
 //!
 //! What comes from where ("that paper" is Harvey et al. 2020):
 //!
@@ -35,9 +36,16 @@
 //!
 //! The network always trains on its own predictions, as in that paper: scheduled sampling draws
 //! without effect. Without noise, which acts in training only, a prediction is deterministic. Root
-//! trajectory and velocity factors are not read. Predicted poses become the 149 numbers of a frame
-//! by forward kinematics; a [`crate::models::transition::Transition`] holds what LRP compares, so
-//! the facing angle matters: see `posed_frames`.
+//! trajectory and velocity factors are not read. On transitions predicted poses become the 149
+//! numbers of a frame by forward kinematics; a [`crate::models::transition::Transition`] holds what
+//! LRP compares, so the facing angle matters: see `posed_frames`.
+//!
+//! On windows of rotations (`kind = "harvey2020_rotations"`) the frames of the past that are given,
+//! as in that paper 9 before k1, are run through the LSTM, whose first state follows from the first
+//! of them; without a past, k1's velocity and contacts are not known and are 0. Training windows
+//! are those that have that past. s_p is the root mean square deviation of joints' positions in the
+//! training windows; velocities are in units of s_p, and of the root's deviation, over the mean way
+//! of a window.
 //!
 //! Parameters: `state_encoder`, `offset_encoder`, `target_encoder`, `initial_state`, `decoder`
 //! (`.0`, `.2`, `.4` as in a `torch.nn.Sequential`), `lstm`, `critics.short`, `critics.long`.
@@ -47,6 +55,13 @@ mod critic;
 mod given;
 mod losses;
 mod network;
+mod rotations;
+mod transition_windows;
+mod transitions;
 
-pub use config::{Harvey2020Config, HarveyLossWeights};
-pub use network::Harvey2020;
+pub use config::{HarveyLossWeights, RecurrentConfig};
+pub use rotations::{
+    Harvey2020Rotations, Harvey2020RotationsConfig, Harvey2020RotationsKind,
+    Harvey2020RotationsSettings,
+};
+pub use transitions::{Harvey2020, Harvey2020Config};

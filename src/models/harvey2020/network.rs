@@ -1,29 +1,19 @@
 //! The recurrent transition network: one frame after the other.
 
-use glam::DVec3;
-use ndarray::{Array2, Array3, s};
+use ndarray::Array2;
 use rand::Rng;
 
-use super::config::Harvey2020Config;
+use super::config::RecurrentConfig;
 use super::critic::Critic;
-use super::given::GivenWindows;
-use super::losses::{self, PredictedFrames, Scales, constant, joints};
+use super::given::{GivenState, GivenWindows, Recorded};
+use super::losses::{self, PredictedFrames, Scales, constant};
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::models::generator::Condition;
-use crate::models::transition::Standardisation;
-use crate::models::transition::pose_windows::ROTATIONS;
-use crate::models::transition::posed_frames::posed_frames;
-use crate::models::transition::{Batch, Forcing, Network};
-use crate::models::{LossTerms, ModelError};
-use crate::motion::JOINTS;
-use crate::motion::features::{BODY_VELOCITIES, FRAME, ROOT_POSITION, ROOT_VELOCITY};
+use crate::models::LossTerms;
+use crate::models::settings::ValueError;
 use crate::nn::{Activation, Initialiser, LastLayer, Lstm, Mlp, sinusoidal_positions};
 
-/// Rotations, root velocity, contacts: the state encoder's input, and what the decoder gives (as
-/// changes, for the rotations).
-const STATE: usize = ROTATIONS + 3 + 4;
-/// Root and rotations still to go to the target.
-const OFFSET: usize = 3 + ROTATIONS;
+/// Contact labels of a frame.
+const CONTACTS: usize = 4;
 /// The decoder's unit of a quaternion's change: about the mean change from one frame to the next in
 /// the dance data's training clips. With it, and with the root's in its own unit, an untrained
 /// network nearly stands still.
@@ -31,11 +21,12 @@ const QUATERNION_CHANGE: f64 = 0.01;
 /// Keeps the gradient of a quaternion's length finite at 0.
 const NORM_EPS: f64 = 1e-8;
 
-/// The network of Harvey et al. 2020.
+/// The network on a body of J joints.
 #[derive(Debug, Clone)]
-pub struct Harvey2020 {
-    config: Harvey2020Config,
-    standardisation: Standardisation,
+pub(super) struct RecurrentNetwork {
+    config: RecurrentConfig,
+    joints: usize,
+    scales: Scales,
     state_encoder: Mlp,
     offset_encoder: Mlp,
     target_encoder: Mlp,
@@ -46,60 +37,65 @@ pub struct Harvey2020 {
     /// The time-to-arrival embedding once for each of the three codes,
     /// `[arrival_frames + 1, 3 code]`.
     arrival: Array2<f64>,
-    /// Root mean square of the standard deviations of p^r (cm) and of v^r (cm/frame): units of the
-    /// root's offset and velocity.
-    root_scale: f64,
-    root_velocity_scale: f64,
 }
 
 /// A frame on the tape, in the windows' frames.
 #[derive(Debug, Clone, Copy)]
-struct State {
-    /// `[windows, 96]`
-    rotations: Var,
+pub(super) struct State {
+    /// `[windows, 4 J]`
+    pub rotations: Var,
     /// `[windows, 3]`, cm
-    root: Var,
-    /// `[windows, 3]`, in units of `root_velocity_scale`
+    pub root: Var,
+    /// `[windows, 3]`, in units of [`Scales::root_velocity`]
     velocity: Var,
     /// `[windows, 4]`
-    contacts: Var,
+    pub contacts: Var,
 }
 
-impl Harvey2020 {
-    /// Builds the network and adds its weights.
+impl RecurrentNetwork {
+    /// Builds the network for `joints` joints and adds its weights. `first` is how many numbers the
+    /// LSTM's first state follows from beside the first frame.
     ///
     /// # Errors
     /// A config whose fields do not fit together.
     pub fn new<T: Real, R: Rng>(
         init: &mut Initialiser<'_, T, R>,
-        config: &Harvey2020Config,
-        standardisation: &Standardisation,
-    ) -> Result<Self, ModelError> {
+        config: &RecurrentConfig,
+        joints: usize,
+        first: usize,
+        scales: Scales,
+    ) -> Result<Self, ValueError> {
         config.check()?;
         let (wide, code, recurrent) = (config.hidden, config.code, config.recurrent);
+        let rotations = 4 * joints;
+        // Rotations, root velocity, contacts: what the state encoder reads and the decoder gives.
+        let state = rotations + 3 + CONTACTS;
         let mut layers = |name: &str, sizes: &[usize], last: LastLayer| {
             Mlp::with_activation(init, name, sizes, Activation::Plu, last)
         };
         let (activated, linear) = (LastLayer::Activated, LastLayer::Linear);
-        let state_encoder = layers("state_encoder", &[STATE, wide, code], activated);
-        let offset_encoder = layers("offset_encoder", &[OFFSET, wide, code], activated);
-        let target_encoder = layers("target_encoder", &[ROTATIONS, wide, code], activated);
-        let first = [STATE + BODY_VELOCITIES.len(), wide, 2 * recurrent];
-        let initial_state = layers("initial_state", &first, linear);
-        let decoder = layers("decoder", &[recurrent, wide, code, STATE], linear);
+        let state_encoder = layers("state_encoder", &[state, wide, code], activated);
+        let offset_encoder = layers("offset_encoder", &[3 + rotations, wide, code], activated);
+        let target_encoder = layers("target_encoder", &[rotations, wide, code], activated);
+        let initial_state = layers(
+            "initial_state",
+            &[state + first, wide, 2 * recurrent],
+            linear,
+        );
+        let decoder = layers("decoder", &[recurrent, wide, code, state], linear);
         let lstm = Lstm::new(init, "lstm", 3 * code, recurrent);
         let critics = match config.adversarial {
-            true => Critic::both(init, config),
+            true => Critic::both(init, config, joints),
             false => Vec::new(),
         };
         let embedding = sinusoidal_positions(config.arrival_frames + 1, code);
         let arrival = Array2::from_shape_fn((embedding.nrows(), 3 * code), |(time, column)| {
             embedding[[time, column % code]]
         });
-        let scale =
-            |std: &[f64]| (std.iter().map(|x| x * x).sum::<f64>() / std.len() as f64).sqrt();
         Ok(Self {
             config: config.clone(),
+            joints,
+            scales,
             state_encoder,
             offset_encoder,
             target_encoder,
@@ -108,59 +104,107 @@ impl Harvey2020 {
             decoder,
             critics,
             arrival,
-            root_scale: scale(&standardisation.std[ROOT_POSITION]),
-            root_velocity_scale: scale(&standardisation.std[ROOT_VELOCITY]),
-            standardisation: standardisation.clone(),
         })
     }
 
-    fn start<'n, T: Real>(
+    fn state<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        given: &GivenState<T>,
+        windows: usize,
+    ) -> State {
+        let velocity = constant(tape, windows, &given.velocity);
+        State {
+            rotations: constant(tape, windows, &given.rotations),
+            root: constant(tape, windows, &given.root),
+            velocity: tape.affine(velocity, 1.0 / self.scales.root_velocity, 0.0),
+            contacts: constant(tape, windows, &given.contacts),
+        }
+    }
+
+    /// At keyframe k1, the past behind it.
+    ///
+    /// # Errors
+    /// Windows of another body.
+    pub fn start<'n, T: Real>(
         &'n self,
         tape: &mut Tape<'_, T>,
-        given: &GivenWindows<'_, T>,
+        given: &GivenWindows<T>,
     ) -> Result<Rollout<'n>, AutogradError> {
         let windows = given.windows;
-        let velocity = constant(tape, windows, &given.root_velocities());
-        let state = State {
-            rotations: constant(tape, windows, &given.rotations(0)),
-            root: constant(tape, windows, &given.roots(0)),
-            velocity: tape.affine(velocity, 1.0 / self.root_velocity_scale, 0.0),
-            contacts: constant(tape, windows, &given.contacts(0)),
-        };
-        let target_rotations = constant(tape, windows, &given.target_rotations());
-        let target_root = constant(tape, windows, &given.roots(given.transition));
+        let (first, later) = given.lead.split_first().ok_or(AutogradError::Misplaced {
+            operation: "harvey2020",
+            what: "windows without their first keyframe",
+        })?;
+        let state = self.state(tape, first, windows);
+        let target_rotations = constant(tape, windows, &given.target_rotations);
+        let target_root = constant(tape, windows, &given.target_root);
         let target_code = self.target_encoder.forward(tape, target_rotations)?;
-        let joint_velocities = constant(tape, windows, &given.body_velocities());
-        let first = tape.concat(&[
-            state.rotations,
-            state.velocity,
-            state.contacts,
-            joint_velocities,
-        ])?;
-        let memory = self.initial_state.forward(tape, first)?;
+        let mut numbers = vec![state.rotations, state.velocity, state.contacts];
+        if !given.first.is_empty() {
+            numbers.push(constant(tape, windows, &given.first));
+        }
+        let numbers = tape.concat(&numbers)?;
+        let memory = self.initial_state.forward(tape, numbers)?;
         let none = tape.constant_with(&[windows, 2 * self.config.code], |out| out.fill(T::zero()));
-        Ok(Rollout {
+        let mut rollout = Rollout {
             network: self,
-            transition: given.transition,
             state,
             memory,
             target_rotations,
             target_root,
             target_code,
             noise: tape.noise(none, self.config.target_noise),
-        })
+        };
+        for (gone, state) in later.iter().enumerate() {
+            rollout.step(tape, given.transition + later.len() - gone)?;
+            rollout.state = self.state(tape, state, windows);
+        }
+        Ok(rollout)
+    }
+
+    /// The losses of windows beside what was recorded of them; `total_windows` as in
+    /// [`crate::models::transition::Batch`].
+    ///
+    /// # Errors
+    /// Windows of another body.
+    pub fn losses<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        given: &GivenWindows<T>,
+        recorded: &Recorded<T>,
+        total_windows: usize,
+    ) -> Result<LossTerms, AutogradError> {
+        let mut rollout = self.start(tape, given)?;
+        let mut motion = PredictedFrames::default();
+        for t in 0..=given.transition {
+            motion.rotations.push(rollout.state.rotations);
+            motion.roots.push(rollout.state.root);
+            motion.contacts.push(rollout.state.contacts);
+            if t < given.transition {
+                rollout.step(tape, given.transition - t)?;
+            }
+        }
+        let recorded = losses::recorded(tape, recorded, given.windows);
+        losses::terms(
+            tape,
+            &self.config,
+            self.scales,
+            &self.critics,
+            given,
+            [&motion, &recorded],
+            total_windows,
+        )
     }
 }
 
 /// The network at work on the windows of one batch.
-struct Rollout<'n> {
-    network: &'n Harvey2020,
-    /// N
-    transition: usize,
-    state: State,
+pub(super) struct Rollout<'n> {
+    network: &'n RecurrentNetwork,
+    pub state: State,
     /// The LSTM's state, `[windows, 2 recurrent]`
     memory: Var,
-    /// `[windows, 96]`
+    /// `[windows, 4 J]`
     target_rotations: Var,
     /// `[windows, 3]`, cm
     target_root: Var,
@@ -170,10 +214,17 @@ struct Rollout<'n> {
 }
 
 impl Rollout<'_> {
-    /// Goes on from frame t to frame t + 1.
-    fn step<T: Real>(&mut self, tape: &mut Tape<'_, T>, t: usize) -> Result<(), AutogradError> {
+    /// Goes on to the next frame, `arrival` frames before the target.
+    ///
+    /// # Errors
+    /// Windows of another body.
+    pub fn step<T: Real>(
+        &mut self,
+        tape: &mut Tape<'_, T>,
+        arrival: usize,
+    ) -> Result<(), AutogradError> {
         let network = self.network;
-        let arrival = self.transition - t;
+        let numbers = 4 * network.joints;
         let State {
             rotations,
             root,
@@ -183,7 +234,7 @@ impl Rollout<'_> {
         let state = tape.concat(&[rotations, velocity, contacts])?;
         let state_code = network.state_encoder.forward(tape, state)?;
         let way = tape.sub(self.target_root, root)?;
-        let way = tape.affine(way, 1.0 / network.root_scale, 0.0);
+        let way = tape.affine(way, 1.0 / network.scales.root, 0.0);
         let turns = tape.sub(self.target_rotations, rotations)?;
         let offset = tape.concat(&[way, turns])?;
         let offset_code = network.offset_encoder.forward(tape, offset)?;
@@ -205,12 +256,12 @@ impl Rollout<'_> {
         let (hidden, memory) = network.lstm.step(tape, codes, self.memory)?;
         self.memory = memory;
         let decoded = network.decoder.forward(tape, hidden)?;
-        let changes = tape.columns(decoded, 0..ROTATIONS)?;
+        let changes = tape.columns(decoded, 0..numbers)?;
         let changes = tape.affine(changes, QUATERNION_CHANGE, 0.0);
         let changed = tape.add(rotations, changes)?;
-        let velocity = tape.columns(decoded, ROTATIONS..ROTATIONS + 3)?;
-        let moved = tape.affine(velocity, network.root_velocity_scale, 0.0);
-        let contacts = tape.columns(decoded, ROTATIONS + 3..STATE)?;
+        let velocity = tape.columns(decoded, numbers..numbers + 3)?;
+        let moved = tape.affine(velocity, network.scales.root_velocity, 0.0);
+        let contacts = tape.columns(decoded, numbers + 3..numbers + 3 + CONTACTS)?;
         self.state = State {
             rotations: tape.normalise(changed, 4, NORM_EPS)?,
             root: tape.add(root, moved)?,
@@ -221,7 +272,7 @@ impl Rollout<'_> {
     }
 
     /// The values on the tape that later frames need.
-    fn keep(&mut self) -> [&mut Var; 5] {
+    pub fn keep(&mut self) -> [&mut Var; 5] {
         let State {
             rotations,
             root,
@@ -230,102 +281,4 @@ impl Rollout<'_> {
         } = &mut self.state;
         [rotations, root, velocity, contacts, &mut self.memory]
     }
-}
-
-impl<T: Real> Network<T> for Harvey2020 {
-    fn reads_poses(&self) -> bool {
-        true
-    }
-
-    fn conditions(&self) -> &'static [Condition] {
-        &[]
-    }
-
-    fn forcing(&self, _drawn: Forcing) -> Forcing {
-        Forcing::FreeRunning
-    }
-
-    fn losses(
-        &self,
-        tape: &mut Tape<'_, T>,
-        batch: &Batch<T>,
-        _forcing: Forcing,
-    ) -> Result<LossTerms, AutogradError> {
-        let given = GivenWindows::new(batch, &self.standardisation)?;
-        let mut rollout = self.start(tape, &given)?;
-        let mut motion = PredictedFrames::default();
-        for t in 0..=given.transition {
-            motion.rotations.push(rollout.state.rotations);
-            motion.roots.push(rollout.state.root);
-            motion.contacts.push(rollout.state.contacts);
-            if t < given.transition {
-                rollout.step(tape, t)?;
-            }
-        }
-        let scales = Scales {
-            position: self.standardisation.position_scale,
-            velocity: self.standardisation.velocity_scale,
-        };
-        losses::terms(
-            tape,
-            &self.config,
-            scales,
-            &self.critics,
-            &given,
-            &motion,
-            batch.total_windows,
-        )
-    }
-
-    fn predict(
-        &self,
-        tape: &mut Tape<'_, T>,
-        batch: &Batch<T>,
-    ) -> Result<Array3<T>, AutogradError> {
-        let given = GivenWindows::new(batch, &self.standardisation)?;
-        let (transition, windows) = (given.transition, given.windows);
-        let mut rollout = self.start(tape, &given)?;
-        let mut world = vec![Vec::with_capacity(transition); windows];
-        let mut contacts = Array3::zeros((windows, transition, 4));
-        let mark = tape.mark();
-        for t in 0..transition {
-            rollout.step(tape, t)?;
-            let joints = joints(tape, &given, rollout.state.rotations)?;
-            let (roots, joints) = (tape.values(rollout.state.root), tape.values(joints));
-            for (window, world) in world.iter_mut().enumerate() {
-                let root = vector(&roots[3 * window..]);
-                let joints = joints[3 * JOINTS * window..].chunks_exact(3).take(JOINTS);
-                world.push(
-                    joints
-                        .map(|joint| given.in_world(window, root + vector(joint)))
-                        .collect::<Vec<_>>(),
-                );
-            }
-            let labels = tape.values(rollout.state.contacts);
-            for (place, &label) in contacts.slice_mut(s![.., t, ..]).iter_mut().zip(labels) {
-                *place = Real::to_f64(label);
-            }
-            tape.forget_since(mark, &mut rollout.keep());
-        }
-        let mut predicted = Array3::from_elem((transition, windows, FRAME), T::zero());
-        for (window, world) in world.iter().enumerate() {
-            let [start, target] = [0, transition].map(|row| given.features(row, window));
-            let contacts = contacts.slice(s![window, .., ..]).to_owned();
-            let ends = [start.view(), target.view()];
-            let frames = posed_frames(ends, world, &contacts, self.config.facing_sigma);
-            let standardised = self.standardisation.standardise(frames.view());
-            predicted
-                .slice_mut(s![.., window, ..])
-                .assign(&standardised.mapv(T::from_f64));
-        }
-        Ok(predicted)
-    }
-}
-
-fn vector<T: Real>(values: &[T]) -> DVec3 {
-    DVec3::new(
-        Real::to_f64(values[0]),
-        Real::to_f64(values[1]),
-        Real::to_f64(values[2]),
-    )
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Li2023;
 use crate::autograd::Real;
+use crate::data::DataConfig;
 use crate::models::ModelError;
 use crate::models::rotations::{
     AugmentationConfig, Body, RotationNetwork, RotationSettings, ScheduleConfig, WindowStatistics,
@@ -216,7 +217,7 @@ impl RotationSettings for Li2023Settings {
         self.contact.rule
     }
 
-    fn check_own(&self) -> Result<(), ValueError> {
+    fn check_own(&self, _data: &DataConfig) -> Result<(), ValueError> {
         let Li2023Config {
             width,
             layers,

@@ -25,6 +25,7 @@ use toml::Table;
 
 use crate::evaluation::in_betweening::InBetweening;
 use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::report::figures::li2023 as figures;
 
 /// The line of the registry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +58,7 @@ impl ModelKind for Li2023Kind {
 pub const DANCE: Paper = Paper {
     name: "li2023",
     printed: include_str!("../../../experiments/li2023/paper.toml"),
-    figures: None,
+    figures: Some(figures::draw),
     protocols: |data, options| vec![Box::new(InBetweening::dance(data, options))],
 };
 
@@ -65,6 +66,6 @@ pub const DANCE: Paper = Paper {
 pub const LAFAN1: Paper = Paper {
     name: "li2023_lafan1",
     printed: include_str!("../../../experiments/li2023_lafan1/paper.toml"),
-    figures: None,
+    figures: Some(figures::draw),
     protocols: |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
 };

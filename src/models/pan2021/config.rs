@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::models::settings::ValueError;
 use crate::models::transition::RootFrame;
+use crate::motion::Mapping;
 use crate::nn::TransformerSizes;
 
 /// How a controller codes its segments.
@@ -88,6 +89,10 @@ pub struct Pan2021Config {
     /// Predicted bodies are brought to the velocity factors that were asked for; not in the paper,
     /// see [`crate::models::transition::velocity_refinement`].
     pub velocity_refinement: bool,
+    /// For clips on another skeleton than the dance skeleton: how the model sees them. A config
+    /// file gives the file's path; positions of joints that both have are what it answers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mapping: Option<Mapping>,
     /// First hidden layer of encoders and decoders.
     pub hidden: usize,
     /// Codes, LSTM states, Transformer tokens, second hidden layer of the decoders.
@@ -117,6 +122,7 @@ impl Default for Pan2021Config {
             control_path_hidden: 512,
             single_frames: 512,
             velocity_refinement: false,
+            mapping: None,
             hidden: 512,
             code: 256,
             window: 7,
@@ -178,6 +184,13 @@ impl Pan2021Config {
             let expected = format!("{least} to {most}");
             require((least..=most).contains(&value), key, &value, &expected)?;
         }
+        let mapping = self.mapping.as_ref();
+        require(
+            mapping.is_none_or(Mapping::keeps_units),
+            "mapping",
+            &"a file that declares a unit or an axis",
+            "one that names joints alone; declare the clips' in [data]",
+        )?;
         require(
             self.code.is_multiple_of(self.heads),
             "code",

@@ -26,6 +26,12 @@ pub struct Batch<T> {
     pub offsets: Array2<T>,
     /// The root on straight lines between the keyframes, from R_1, `[rows, 3]`, cm.
     pub root: Array2<T>,
+    /// P, frames before the first keyframe that are given of every window.
+    pub past_frames: usize,
+    /// Rotations of these, P rows a window, `[W P, 4 J]`.
+    pub past_rotations: Array2<T>,
+    /// The root of these from R_1, `[W P, 3]`, cm.
+    pub past_root: Array2<T>,
     /// What was recorded; none where it is asked for.
     pub truth: Option<Truth<T>>,
     /// Windows of the whole step, of which these are a part.
@@ -42,7 +48,8 @@ pub struct Truth<T> {
 }
 
 impl<T: Real> Batch<T> {
-    /// Windows of one length, all of one body; their truths, or none. `input` says how X is made.
+    /// Windows of one length, all of one body and with as much of the past; their truths, or none.
+    /// `input` says how X is made.
     pub fn of(windows: &[GivenWindow], truths: &[WindowTruth], input: Interpolation) -> Self {
         let frames = windows.first().map_or(0, |window| window.frames);
         let rows = windows.len() * frames;
@@ -63,6 +70,10 @@ impl<T: Real> Batch<T> {
             0 => [1.0, 0.0],
             _ => [0.0, 1.0],
         };
+        let past_frames = windows.first().map_or(0, |window| window.past.len());
+        let past = || windows.iter().flat_map(|window| &window.past);
+        let past_rotations = past().flat_map(|frame| &frame.rotations);
+        let past_rotations = past_rotations.flat_map(|q| q.to_array());
         let truth = Truth {
             rotations: quaternions(truths.iter().map(|truth| truth.rotations.clone()).collect()),
             root: vectors(
@@ -88,6 +99,13 @@ impl<T: Real> Batch<T> {
                     .flat_map(GivenWindow::straight_root)
                     .collect(),
             ),
+            past_frames,
+            past_rotations: table(windows.len() * past_frames, 4 * joints, past_rotations),
+            past_root: table(
+                windows.len() * past_frames,
+                3,
+                past().flat_map(|frame| frame.root.to_array()),
+            ),
             truth: (!truths.is_empty()).then_some(truth),
             total_windows: windows.len(),
         }
@@ -105,6 +123,9 @@ impl<T: Real> Batch<T> {
             distances: single(&self.distances),
             offsets: single(&self.offsets),
             root: single(&self.root),
+            past_frames: self.past_frames,
+            past_rotations: single(&self.past_rotations),
+            past_root: single(&self.past_root),
             truth: self.truth.as_ref().map(|truth| Truth {
                 rotations: single(&truth.rotations),
                 root: single(&truth.root),

@@ -10,7 +10,7 @@ use crate::data::Recording;
 use crate::models::transition::{RootFrame, Window};
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
-use crate::motion::{Clip, ContactRule, Feet, Foot, at_tempo, mirror_image};
+use crate::motion::{Clip, ContactRule, Feet, Foot, Pose, at_tempo, mirror_image};
 
 /// What is trained beside the recorded windows; the papers train nothing else.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -61,7 +61,8 @@ impl TrainingClip {
         })
     }
 
-    /// The `frames` frames from `start` on, between the first and the last of them as keyframes.
+    /// The `frames` frames from `start` on, between the first and the last of them as keyframes, with
+    /// the `past` frames before.
     ///
     /// # Panics
     /// They are not all in the clip, or fewer than two.
@@ -69,6 +70,7 @@ impl TrainingClip {
         &self,
         start: usize,
         frames: usize,
+        past: usize,
         root_frame: RootFrame,
     ) -> (GivenWindow, WindowTruth) {
         let poses = &self.clip.poses[start..start + frames];
@@ -81,7 +83,8 @@ impl TrainingClip {
             contacts.map(|foot| foot.one_hot()).collect(),
         );
         let truth = given.truth(poses);
-        (given, truth)
+        let past: Vec<&Pose> = self.clip.poses[start - past..start].iter().collect();
+        (given.with_past(&past), truth)
     }
 
     /// Number of frames.
@@ -143,11 +146,13 @@ impl Forms {
         &self.forms[0]
     }
 
-    /// Draws the form in which a window of `frames` frames is seen, and where it then starts.
+    /// Draws the form in which a window of `frames` frames with `past` frames before it is seen, and
+    /// where it then starts.
     pub fn draw(
         &self,
         window: Window,
         frames: usize,
+        past: usize,
         stream: &mut impl rand::Rng,
     ) -> (&TrainingClip, usize) {
         let sides = 1 + usize::from(self.mirror);
@@ -161,10 +166,10 @@ impl Forms {
         };
         let recorded = &self.forms[side][window.clip];
         let clip = &self.forms[tempo * sides + side][window.clip];
-        match clip.frames().checked_sub(frames) {
+        match clip.frames().checked_sub(past + frames) {
             Some(last) => (
                 clip,
-                (window.start * clip.frames() / recorded.frames()).min(last),
+                (window.start * clip.frames() / recorded.frames()).clamp(past, past + last),
             ),
             None => (recorded, window.start),
         }

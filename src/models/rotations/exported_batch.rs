@@ -15,7 +15,8 @@ use crate::nn::Initialiser;
 
 /// Random masks are off. W windows of T frames, rows = W T: `input [rows, 4 J]`,
 /// `keyframes [rows, 2]`, `contacts [rows, 2]`, `distances [rows, 1]`, `offsets [rows, 3 J]`,
-/// `straight_root [rows, 3]`, `truth.rotations [rows, 4 J]`, `truth.root [rows, 3]`, as in
+/// `straight_root [rows, 3]`, of a model that is given a past `past.rotations [W P, 4 J]` and
+/// `past.root [W P, 3]`, `truth.rotations [rows, 4 J]`, `truth.root [rows, 3]`, as in
 /// [`Batch`]; `windows [1]`, `parents [J]` (-1: none), `feet [2]` (right and left);
 /// `output.rotations`, `output.contacts`, `output.root`, those that the network says; `loss.*`,
 /// `gradient.*`.
@@ -48,7 +49,9 @@ pub(super) fn export<S: RotationSettings>(
     };
     let lengths: Vec<usize> = recordings.iter().map(|it| it.frames()).collect();
     let mut windows = Vec::new();
-    for window in spread(&cut.windows(&lengths), frames, options)? {
+    let mut all = cut.windows(&lengths);
+    all.retain(|window| window.start >= settings.past());
+    for window in spread(&all, frames, options)? {
         // As a training labels it.
         let indices = [0, window.clip as u64];
         let clip = TrainingClip::new(
@@ -57,7 +60,7 @@ pub(super) fn export<S: RotationSettings>(
             setting.data.contact_threshold,
             setting.streams.stream("contact_foot", &indices),
         )?;
-        windows.push(clip.window(window.start, frames, settings.root_frame()));
+        windows.push(clip.window(window.start, frames, settings.past(), settings.root_frame()));
     }
     let (given, truths): (Vec<_>, Vec<_>) = windows.into_iter().unzip();
     let mut exported = ExportedBatch::default();
@@ -107,6 +110,10 @@ fn add_results<T: Real>(
     add("distances", &batch.distances);
     add("offsets", &batch.offsets);
     add("straight_root", &batch.root);
+    if batch.past_frames > 0 {
+        add("past.rotations", &batch.past_rotations);
+        add("past.root", &batch.past_root);
+    }
     if let Some(truth) = &batch.truth {
         add("truth.rotations", &truth.rotations);
         add("truth.root", &truth.root);

@@ -56,7 +56,7 @@ pub fn generated_batch<S: RotationSettings>(
     let root_frame = settings.root_frame();
     let windows_of = clips
         .iter()
-        .map(|clip| clip.window(start, frames, root_frame));
+        .map(|clip| clip.window(start, frames, settings.past(), root_frame));
     let (given, truths): (Vec<_>, Vec<_>) = windows_of.unzip();
     let cut: Vec<Window> = (0..windows).map(|clip| Window { clip, start }).collect();
     let statistics = WindowStatistics::of(&clips, &cut, frames, root_frame);

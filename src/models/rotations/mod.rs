@@ -32,4 +32,4 @@ pub use settings::RotationSettings;
 pub use statistics::WindowStatistics;
 pub use task::RotationTask;
 pub use trained::TrainedRotations;
-pub use window::{GivenWindow, WindowTruth};
+pub use window::{GivenWindow, PastFrame, WindowTruth};

@@ -35,6 +35,16 @@ pub trait RotationNetwork<T: Real>: Send + Sync {
 
     /// Longest window, frames.
     fn longest(&self) -> usize;
+
+    /// Frames before the first keyframe that it must be given.
+    fn past(&self) -> usize {
+        0
+    }
+
+    /// Most keyframes of a window; what lies between more is made piece by piece.
+    fn most_keyframes(&self) -> usize {
+        usize::MAX
+    }
 }
 
 /// What a network says, a row a frame.

@@ -142,8 +142,15 @@ pub struct BatchPlan {
 }
 
 impl Schedule {
-    pub fn new(clip_frames: &[usize], config: &ScheduleConfig, streams: Streams) -> Self {
-        let windows = config.cut().windows(clip_frames);
+    /// The windows of clips of these lengths that have `past` frames before them.
+    pub fn new(
+        clip_frames: &[usize],
+        past: usize,
+        config: &ScheduleConfig,
+        streams: Streams,
+    ) -> Self {
+        let mut windows = config.cut().windows(clip_frames);
+        windows.retain(|window| window.start >= past);
         let mut schedule = Self {
             whole_steps: windows.len().div_ceil(config.batch_size) as u64 * config.epochs,
             windows,

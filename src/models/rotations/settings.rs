@@ -41,11 +41,16 @@ pub trait RotationSettings: Serialize + Clone + Debug + Send + Sync + 'static {
     /// How recorded frames are labelled.
     fn contact_rule(&self) -> ContactRule;
 
+    /// Frames before the first keyframe that are given.
+    fn past(&self) -> usize {
+        0
+    }
+
     /// Checks the values that are its own.
     ///
     /// # Errors
-    /// The first out of its range.
-    fn check_own(&self) -> Result<(), ValueError>;
+    /// The first out of its range, or that does not fit the data's.
+    fn check_own(&self, data: &DataConfig) -> Result<(), ValueError>;
 
     /// The network, its weights added through `init`.
     ///
@@ -116,7 +121,7 @@ impl<S: RotationSettings> ModelSettings for S {
         Table::try_from(self)
     }
 
-    fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
+    fn check(&self, data: &DataConfig) -> Result<(), ValueError> {
         self.schedule().check()?;
         let tempi = &self.augmentation().tempi;
         let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
@@ -126,7 +131,7 @@ impl<S: RotationSettings> ModelSettings for S {
             format!("{tempi:?}"),
             "at most 16 tempi from 0.25 to 4",
         )?;
-        self.check_own()
+        self.check_own(data)
     }
 
     fn budget_note(&self) -> String {

@@ -22,6 +22,8 @@ pub struct RotationTask {
     shards: usize,
     reference: Reference,
     statistics: WindowStatistics,
+    /// Frames before a window that are given.
+    past: usize,
     streams: Streams,
     /// The windows of the epoch that was asked for last.
     epoch: Mutex<Option<(u64, Arc<Vec<Window>>)>>,
@@ -49,14 +51,15 @@ impl RotationTask {
         let forms = Forms::of(recordings, augmentation, rule, threshold, streams)?;
         let frames: Vec<usize> = recordings.iter().map(|it| it.frames()).collect();
         let config = settings.schedule();
-        let schedule = Schedule::new(&frames, config, streams);
+        let past = settings.past();
+        let schedule = Schedule::new(&frames, past, config, streams);
         if schedule.steps() == 0 {
             let longest = frames.iter().copied().max().unwrap_or(0);
             return Err(ModelError::Data {
                 reason: format!(
-                    "no training clip has the {} frames of a window (schedule.window), the longest \
-                     of {} has {longest}",
-                    config.cut().needed(),
+                    "no training clip has the {} frames of a window (schedule.window) and of its past, \
+                     the longest of {} has {longest}",
+                    config.cut().needed() + past,
                     counted(frames.len(), "clip"),
                 ),
             });
@@ -75,6 +78,7 @@ impl RotationTask {
             schedule,
             shards: config.shards,
             statistics,
+            past,
             streams,
             epoch: Mutex::new(None),
         })
@@ -170,11 +174,14 @@ impl Step<f32> for RotationStep<'_> {
             .unwrap_or(0..0);
         let (mut given, mut truths) = (Vec::new(), Vec::new());
         for index in range {
-            let streams = self.task.streams;
+            let (streams, past) = (self.task.streams, self.task.past);
             let mut stream = streams.stream("augmentation", &[self.step, index as u64]);
-            let (clip, start) = self.task.forms.draw(windows[index], *frames, &mut stream);
+            let (clip, start) = self
+                .task
+                .forms
+                .draw(windows[index], *frames, past, &mut stream);
             let root_frame = self.task.reference.root_frame;
-            let (window, truth) = clip.window(start, *frames, root_frame);
+            let (window, truth) = clip.window(start, *frames, past, root_frame);
             given.push(window);
             truths.push(truth);
         }

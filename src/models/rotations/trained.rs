@@ -7,7 +7,8 @@ use ndarray::{Array2, Array3};
 
 use super::{Batch, Body, GivenWindow, RootSource, RotationNetwork, RotationSettings};
 use crate::autograd::{Parameters, Tape, Workspace};
-use crate::models::generator::{Condition, Motion, NeededPoses, Needs, Request};
+use crate::counted::counted;
+use crate::models::generator::{Condition, Given, Motion, NeededPoses, Needs, Request};
 use crate::models::transition::RootFrame;
 use crate::models::{Generator, ModelError};
 use crate::motion::facing::FacingJoints;
@@ -100,12 +101,7 @@ impl TrainedRotations {
         self.reference
             .body
             .check("the request", &request.skeleton)?;
-        let given: Vec<(usize, &Pose)> = request
-            .given
-            .iter()
-            .filter_map(|given| Some((usize::try_from(given.frame).ok()?, &given.pose)))
-            .collect();
-        for (frame, pose) in &given {
+        for Given { frame, pose, .. } in &request.given {
             let joints = self.reference.body.joints();
             if pose.rotations.len() != joints || pose.translations.len() != joints {
                 return Err(ModelError::Shape {
@@ -115,6 +111,11 @@ impl TrainedRotations {
                 });
             }
         }
+        let given: Vec<(usize, &Pose)> = request
+            .given
+            .iter()
+            .filter_map(|given| Some((usize::try_from(given.frame).ok()?, &given.pose)))
+            .collect();
         if let Some(contacts) = &request.contacts
             && contacts.ncols() != 2
         {
@@ -148,9 +149,16 @@ impl TrainedRotations {
         while first + 1 < given.len() {
             let start = given[first].0;
             let fits = |&(frame, _): &&(usize, &Pose)| frame - start < longest;
-            let last = first + given[first..].iter().take_while(fits).count() - 1;
+            let most = given[first..].iter().take(self.network.most_keyframes());
+            let last = first + most.take_while(fits).count() - 1;
             pieces.push(self.piece(index, request, &given[first..=last]));
             first = last;
+        }
+        if pieces.len() > 1 && self.network.past() > 0 {
+            return Err(self.refused(format!(
+                "it goes on from {} to one keyframe, at most {longest} frames on; give no others",
+                counted(self.network.past(), "pose")
+            )));
         }
         Ok(pieces)
     }
@@ -165,15 +173,21 @@ impl TrainedRotations {
             .iter()
             .map(|&(frame, pose)| (frame - start, pose))
             .collect();
+        let past = request.given.iter().filter(|given| {
+            let nearest = -(self.network.past() as i64);
+            (nearest..0).contains(&given.frame)
+        });
+        let past: Vec<&Pose> = past.map(|given| &given.pose).collect();
+        let window = GivenWindow::new(
+            &request.skeleton,
+            &self.reference.facing,
+            self.reference.root_frame,
+            &keyframes,
+            contacts.collect(),
+        );
         Piece {
             request: index,
-            window: GivenWindow::new(
-                &request.skeleton,
-                &self.reference.facing,
-                self.reference.root_frame,
-                &keyframes,
-                contacts.collect(),
-            ),
+            window: window.with_past(&past),
             keyframes: keyframes
                 .into_iter()
                 .map(|(at, pose)| (at, pose.clone()))
@@ -382,7 +396,9 @@ impl Generator for TrainedRotations {
 
     fn needs(&self) -> Needs {
         Needs {
-            poses: NeededPoses::Keyframes,
+            poses: NeededPoses::Keyframes {
+                past: self.network.past(),
+            },
             conditions: match self.network.needs_contacts() {
                 true => &[Condition::Contacts],
                 false => &[],

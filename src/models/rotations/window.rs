@@ -18,6 +18,8 @@ pub struct GivenWindow {
     pub keyframes: Vec<(usize, Vec<DQuat>)>,
     /// Place of the root at each keyframe, measured from that at the first, cm.
     pub roots: Vec<DVec3>,
+    /// The frames before the first keyframe that are given, in the order of time.
+    pub past: Vec<PastFrame>,
     /// Weights of the right and the left foot, `[T]`.
     pub contacts: Vec<[f64; 2]>,
     /// Translation of each joint in its parent's frame at the first keyframe, `[J]`, cm; the
@@ -27,6 +29,15 @@ pub struct GivenWindow {
     pub origin: DVec3,
     /// From the world's orientation to the network's.
     pub turn: DQuat,
+}
+
+/// A frame before the first keyframe, in the frame of reference of a [`GivenWindow`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastFrame {
+    /// Local rotations with the sign that is nearer to the frame after, `[J]`.
+    pub rotations: Vec<DQuat>,
+    /// The root measured from the first keyframe, cm.
+    pub root: DVec3,
 }
 
 /// A recorded window in the frame of reference of a [`GivenWindow`].
@@ -78,11 +89,30 @@ impl GivenWindow {
                 .iter()
                 .map(|(_, pose)| turn * (pose.translations[0] - origin))
                 .collect(),
+            past: Vec::new(),
             contacts,
             offsets,
             origin,
             turn,
         }
+    }
+
+    /// The same window with the poses before its first keyframe, in the order of time.
+    pub fn with_past(mut self, poses: &[&Pose]) -> Self {
+        let mut after = self.keyframes[0].1.clone();
+        let mut past: Vec<PastFrame> = Vec::new();
+        for pose in poses.iter().rev() {
+            let mut rotations = turned(pose, self.turn);
+            follow(&mut rotations, &after);
+            after.clone_from(&rotations);
+            past.push(PastFrame {
+                rotations,
+                root: self.turn * (pose.translations[0] - self.origin),
+            });
+        }
+        past.reverse();
+        self.past = past;
+        self
     }
 
     /// The two keyframes around a frame, and the share of the way between them.

@@ -1,14 +1,16 @@
 //! Models of transitions as what the commands ask: each is a [`Generator`].
 
+use std::borrow::Cow;
+
 use glam::DVec3;
-use ndarray::{Array1, Array2, Array3, s};
+use ndarray::{Array1, Array2, Array3, Axis, s};
 
 use super::{KeyframePose, Transition, TransitionModel, TransitionRequest};
 use crate::models::generator::{Given, Motion, NeededPoses, Needs, Request};
 use crate::models::{Generator, ModelError};
 use crate::motion::features::{CONTACTS, FACING, FRAME};
 use crate::motion::placement::world_positions;
-use crate::motion::{Clip, FeatureConfig, JOINTS, PARTS, features};
+use crate::motion::{Clip, FeatureConfig, JOINTS, Mapping, PARTS, features};
 
 /// A model of transitions is asked for motion between two poses.
 impl<M: TransitionModel> Generator for M {
@@ -25,15 +27,28 @@ impl<M: TransitionModel> Generator for M {
     }
 
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {
-        let transitions = answers(self, requests)?;
-        let motions = requests.iter().zip(transitions);
+        let seen = seen(self, requests)?;
+        let transitions = answers(self, &seen)?;
+        let motions = requests.iter().zip(seen.iter().zip(transitions));
         motions
-            .map(|(request, transition)| motion(request, transition))
+            .map(|(request, (seen, transition))| {
+                let motion = motion(seen, transition)?;
+                match Generator::mapping(self) {
+                    Some(mapping) if !request.skeleton.is_dance_skeleton() => {
+                        on_skeleton_of(request, motion, mapping)
+                    }
+                    _ => Ok(motion),
+                }
+            })
             .collect()
     }
 
+    fn mapping(&self) -> Option<&Mapping> {
+        TransitionModel::mapping(self)
+    }
+
     fn raw(&self, requests: &[Request]) -> Result<Vec<Array2<f64>>, ModelError> {
-        let transitions = answers(self, requests)?;
+        let transitions = answers(self, &seen(self, requests)?)?;
         Ok(transitions.into_iter().map(|it| it.frames).collect())
     }
 }
@@ -51,6 +66,56 @@ fn answers<M: TransitionModel>(
         })
         .collect::<Result<_, _>>()?;
     model.transitions(&requests)
+}
+
+/// Requests on the dance skeleton: those on another, as the model's mapping shows them.
+fn seen<'r, M: TransitionModel>(
+    model: &M,
+    requests: &'r [Request],
+) -> Result<Cow<'r, [Request]>, ModelError> {
+    let Some(mapping) = TransitionModel::mapping(model) else {
+        return Ok(requests.into());
+    };
+    let seen = requests.iter().map(|request| {
+        if request.skeleton.is_dance_skeleton() {
+            return Ok(request.clone());
+        }
+        let clip = Clip {
+            name: "the request".into(),
+            skeleton: request.skeleton.clone(),
+            frame_time: request.frame_time,
+            poses: request.given.iter().map(|it| it.pose.clone()).collect(),
+        };
+        let mapped = mapping.apply(&clip);
+        let mapped = mapped.map_err(|error| ModelError::data(&error))?;
+        let given = request.given.iter().zip(mapped.poses);
+        Ok(Request {
+            skeleton: mapped.skeleton,
+            given: given
+                .map(|(given, pose)| Given {
+                    pose,
+                    ..given.clone()
+                })
+                .collect(),
+            ..request.clone()
+        })
+    });
+    seen.collect()
+}
+
+/// A motion of the dance skeleton as one of the request's: the positions of the joints that both
+/// have.
+fn on_skeleton_of(
+    request: &Request,
+    motion: Motion,
+    mapping: &Mapping,
+) -> Result<Motion, ModelError> {
+    let counterparts = mapping.counterparts(&request.skeleton);
+    let counterparts = counterparts.map_err(|error| ModelError::data(&error))?;
+    Ok(Motion {
+        positions: motion.positions.select(Axis(1), &counterparts),
+        ..motion
+    })
 }
 
 /// The frames of a transition in the world, after the keyframe that they start from.

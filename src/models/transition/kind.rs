@@ -13,7 +13,8 @@ use crate::models::baselines::zero_velocity::ZeroVelocity;
 use crate::models::harvey2020::{Harvey2020, Harvey2020Config};
 use crate::models::pan2021::{Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
 use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
-use crate::models::{Generator, ModelError};
+use crate::models::{Generator, ModelError, li2023};
+use crate::motion::Mapping;
 use crate::nn::Initialiser;
 
 /// A kind of transition model: a line of the registry.
@@ -60,7 +61,10 @@ impl ModelKind for Kind {
     }
 
     fn papers(&self) -> Vec<Paper> {
-        vec![PAPER]
+        match self {
+            Self::Pan2021 => vec![PAPER, li2023::DANCE, li2023::LAFAN1],
+            _ => vec![PAPER],
+        }
     }
 
     fn defaults(&self) -> Table {
@@ -182,6 +186,14 @@ impl ModelConfig {
         match self {
             Self::Pan2021(config) => config.velocity_refinement,
             _ => false,
+        }
+    }
+
+    /// How it sees clips on another skeleton than the dance skeleton.
+    pub fn mapping(&self) -> Option<&Mapping> {
+        match self {
+            Self::Pan2021(config) => config.mapping.as_ref(),
+            _ => None,
         }
     }
 

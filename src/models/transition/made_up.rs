@@ -76,6 +76,7 @@ impl MadeUpTask {
                 }],
                 standardisation,
                 root_frame: RootFrame::World,
+                mapping: None,
             },
             shards: settings.schedule.shards,
         })

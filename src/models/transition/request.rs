@@ -5,7 +5,7 @@ use ndarray::{Array1, Array2, ArrayView2};
 use crate::models::ModelError;
 use crate::models::generator::Condition;
 use crate::motion::features::{FEATURES, FRAME};
-use crate::motion::{JOINTS, Pose, Skeleton};
+use crate::motion::{JOINTS, Mapping, Pose, Skeleton};
 
 /// One of the two keyframes of a transition.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,6 +149,11 @@ pub trait TransitionModel: Send + Sync {
     /// What it must be given beside the two keyframes.
     fn conditions(&self) -> &'static [Condition] {
         &[Condition::RootTrajectory]
+    }
+
+    /// How it sees requests on another skeleton than the dance skeleton.
+    fn mapping(&self) -> Option<&Mapping> {
+        None
     }
 
     /// Predicts the frames k1 + 1 .. k2 of every request, in the order of the requests.

@@ -8,10 +8,10 @@ use super::exported_batch;
 use super::gradient_check::{self, GradientCheckError};
 use super::made_up::MadeUpTask;
 use super::task::TransitionTask;
-use super::{ModelConfig, Standardisation, TrainedModel};
+use super::{DanceClip, ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
-use crate::data::DataConfig;
+use crate::data::{DataConfig, Recording};
 use crate::experiment::ExperimentConfig;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
@@ -19,6 +19,7 @@ use crate::models::settings::{
 };
 use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Streams, Task};
+use crate::motion::MappingError;
 use crate::nn::Initialiser;
 
 /// Longest transition that a schedule may name, frames.
@@ -155,9 +156,7 @@ impl ModelSettings for TransitionSettings {
         setting: &TaskSetting<'d>,
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
-        let data = setting.dataset.train.as_slice();
-        let clips = super::DanceClip::measure_all(data, &setting.data.features())
-            .map_err(|error| ModelError::data(&error))?;
+        let clips = self.clips(setting)?;
         let task = TransitionTask::new(self, setting, clips, |statistics| {
             self.model.build(init, statistics)
         })?;
@@ -205,9 +204,7 @@ impl ModelSettings for TransitionSettings {
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
         let model = self.load(self.kind(), saved)?;
-        let clips = &setting.dataset.train;
-        let clips = super::DanceClip::measure_all(clips, &setting.data.features())
-            .map_err(|error| ModelError::data(&error))?;
+        let clips = self.clips(setting)?;
         let root_frame = self.model.root_frame();
         Ok(exported_batch::export(&model, root_frame, &clips, options)?)
     }
@@ -248,7 +245,26 @@ impl TransitionSettings {
             standardisation,
             root_frame,
         )
-        .refining_velocities(self.model.refines_velocities()))
+        .refining_velocities(self.model.refines_velocities())
+        .seeing_through(self.model.mapping().cloned()))
+    }
+
+    /// The training clips as the model sees them, measured.
+    fn clips(&self, setting: &TaskSetting<'_>) -> Result<Vec<DanceClip>, ModelError> {
+        let config = setting.data.features();
+        let recordings = setting.dataset.train.as_slice();
+        let mapped = self.model.mapping().map(|mapping| {
+            let mapped = recordings.iter().map(|recording| {
+                let clip = mapping.apply(&recording.clip)?;
+                Ok(Recording::of(clip))
+            });
+            mapped.collect::<Result<Vec<_>, MappingError>>()
+        });
+        let mapped = mapped
+            .transpose()
+            .map_err(|error| ModelError::data(&error))?;
+        let recordings = mapped.as_deref().unwrap_or(recordings);
+        DanceClip::measure_all(recordings, &config).map_err(|error| ModelError::data(&error))
     }
 }
 

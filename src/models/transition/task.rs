@@ -77,6 +77,7 @@ impl TransitionTask {
                 clips,
                 standardisation,
                 root_frame,
+                mapping: settings.model.mapping().cloned(),
             },
             augmentation,
             schedule,

@@ -13,6 +13,7 @@ use super::{RootFrame, Standardisation};
 use crate::autograd::{Parameters, Tape, Workspace};
 use crate::models::ModelError;
 use crate::models::generator::Condition;
+use crate::motion::Mapping;
 use crate::motion::features::{FEATURES, ROOT_POSITION, VELOCITY_FACTORS};
 
 /// A trained network, in f32.
@@ -23,6 +24,7 @@ pub struct TrainedModel {
     standardisation: Standardisation,
     root_frame: RootFrame,
     refines_velocities: bool,
+    mapping: Option<Mapping>,
     workspaces: Mutex<Vec<Workspace<f32>>>,
 }
 
@@ -43,6 +45,7 @@ impl TrainedModel {
             standardisation,
             root_frame,
             refines_velocities: false,
+            mapping: None,
             workspaces: Mutex::new(Vec::new()),
         }
     }
@@ -54,6 +57,11 @@ impl TrainedModel {
             refines_velocities: refining,
             ..self
         }
+    }
+
+    /// The same model for requests on another skeleton, which it sees by a mapping.
+    pub fn seeing_through(self, mapping: Option<Mapping>) -> Self {
+        Self { mapping, ..self }
     }
 
     pub fn network(&self) -> &dyn Network<f32> {
@@ -171,6 +179,10 @@ impl TransitionModel for TrainedModel {
             true => &[Condition::RootTrajectory, Condition::VelocityFactors],
             false => self.network.conditions(),
         }
+    }
+
+    fn mapping(&self) -> Option<&Mapping> {
+        self.mapping.as_ref()
     }
 
     fn transitions(&self, requests: &[TransitionRequest]) -> Result<Vec<Transition>, ModelError> {

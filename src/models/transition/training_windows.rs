@@ -10,6 +10,7 @@ use super::{
 };
 use crate::autograd::{Parameters, Real};
 use crate::models::Generator;
+use crate::motion::Mapping;
 use crate::motion::features::FEATURES;
 
 /// What is trained, and how it is standardised.
@@ -17,6 +18,8 @@ pub(super) struct TrainingWindows {
     pub clips: Vec<DanceClip>,
     pub standardisation: Standardisation,
     pub root_frame: RootFrame,
+    /// How the clips were brought onto the dance skeleton.
+    pub mapping: Option<Mapping>,
 }
 
 impl TrainingWindows {
@@ -44,13 +47,14 @@ impl TrainingWindows {
         network: &Arc<dyn Network<f32>>,
         parameters: Parameters<f32>,
     ) -> Box<dyn Generator> {
-        Box::new(TrainedModel::new(
+        let model = TrainedModel::new(
             name.into(),
             network.clone(),
             parameters,
             self.standardisation.clone(),
             self.root_frame,
-        ))
+        );
+        Box::new(model.seeing_through(self.mapping.clone()))
     }
 }
 

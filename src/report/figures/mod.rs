@@ -1,6 +1,8 @@
 //! The figures of papers: each an SVG with a caption, its numbers as CSV beside it. One file or
 //! folder a paper.
 
+#[cfg(feature = "papers")]
+pub mod li2023;
 mod numbers;
 #[cfg(feature = "papers")]
 pub mod pan2021;
@@ -24,8 +26,8 @@ pub struct FigureRequest<'a> {
     pub compared: &'a [Subject],
     /// Test clips are drawn and measured.
     pub dataset: &'a Dataset,
-    /// Frames of what is shown.
-    pub length: usize,
+    /// Frames of what is shown from keyframe to keyframe [default: the paper's].
+    pub length: Option<usize>,
     /// The test clip that is shown [default: the first by name that is long enough].
     pub clip: Option<&'a str>,
     /// Its first frame [default: what is shown lies in the middle].

@@ -193,6 +193,7 @@ pub fn row_with_paths(label: &str, generated: &Generated, view: PathView) -> Mot
     MotionRow {
         paths: Some(RootPaths {
             view,
+            target_label: "root asked for",
             target: generated.target(),
             generated: generated.roots(),
         }),

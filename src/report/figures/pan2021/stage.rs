@@ -18,6 +18,9 @@ use crate::synthesis::{SequenceRequest, SynthesisError};
 /// Windows that a model predicts in one call.
 const CHUNK: usize = 8;
 
+/// Frames from keyframe to keyframe, where none are asked for.
+const LENGTH: usize = 100;
+
 /// Transitions of test clips, one a clip: the first is shown, all are measured.
 pub struct Stage<'d> {
     /// At least one.
@@ -54,6 +57,7 @@ impl<'d> Stage<'d> {
             start,
             ..
         } = *asked;
+        let length = length.unwrap_or(LENGTH);
         let needed = length + 1;
         let fitting = clips.iter().filter(|clip| clip.frames() >= needed);
         let mut fitting: Vec<&DanceClip> = fitting.collect();
