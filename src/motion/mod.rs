@@ -18,6 +18,7 @@ pub mod oddities;
 pub mod placement;
 pub mod resample;
 pub mod root_reconstruction;
+pub mod rotation_6d;
 pub mod rotation_fit;
 pub mod rotation_window;
 pub mod skeleton;
