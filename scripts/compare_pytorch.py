@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent / "pytorch_reference"))
 import checks  # noqa: E402
 import li2023_checks  # noqa: E402
 import li2023_timing  # noqa: E402
+import pu2022_checks  # noqa: E402
 import timing  # noqa: E402
 
 SIZES = {"pan2021": ([5, 30, 60], 128), "li2023": ([50], 12)}
@@ -73,6 +74,8 @@ def check_kind(weights, batch, tolerance):
     kind = config.get("model", {}).get("kind", "pan2021")
     if kind == "li2023":
         return li2023_checks.check(weights, config, batch, tolerance)
+    if kind == "pu2022":
+        return pu2022_checks.check(weights, config, batch, tolerance)
     if kind == "pan2021":
         return checks.check(weights, batch, tolerance or 1e-4)
     raise SystemExit(f"{weights}: there is no PyTorch version of {kind}")

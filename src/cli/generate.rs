@@ -3,6 +3,7 @@
 
 mod keyframes;
 mod rotations;
+mod song;
 mod trajectory;
 mod velocity;
 
@@ -24,6 +25,7 @@ use crate::synthesis::keyframes::Keyframes;
 use crate::synthesis::{ControlWarning, Summary, SynthesisOptions, control_warnings, synthesise};
 use keyframes::KeyframeArgs;
 use rotations::ContactArgs;
+use song::SongArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
 
@@ -55,6 +57,8 @@ pub struct GenerateArgs {
     velocity: VelocityArgs,
     #[command(flatten)]
     contacts: ContactArgs,
+    #[command(flatten)]
+    song: SongArgs,
     /// Pin the feet where the model predicts contact
     #[arg(long)]
     foot_cleanup: bool,
@@ -85,16 +89,28 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
         let (what, poses) = (&subject.what, counted(frames, "pose"));
         anyhow::bail!("{what} dances on from {poses}; generate makes motions between keyframes");
     }
-    let choice = args.keyframes.choice();
+    let choice = args.keyframes.choice(subject.config.data.fps);
     let (mut inputs, own) = (choice.files(), subject.files());
     inputs.extend(&own);
     let TrajectoryArgs { trajectory, .. } = &args.trajectory;
     inputs.extend(trajectory.iter().chain(&args.velocity.velocity_csv));
+    inputs.extend(args.song.files());
     inputs.extend(args.velocity.velocity_from.iter().map(|from| &from.file));
     let outputs = args.viewer.iter().chain(&args.json).chain([&args.out]);
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
+    if let Some(music) = &args.song.music {
+        return song::run(&args, &subject, music);
+    }
+    if let NeededPoses::Seed(frames) = needs.poses {
+        let frames = counted(frames, "frame");
+        anyhow::bail!(
+            "{} goes on from a seed of {frames} to music; give --music SONG and --seed-motion \
+             FILE.bvh",
+            subject.what
+        );
+    }
     if let NeededPoses::Keyframes { .. } = needs.poses {
         return rotations::run(&args, &subject);
     }

@@ -21,6 +21,8 @@ pub mod harvey2020;
 pub mod li2023;
 #[cfg(feature = "papers")]
 pub mod pan2021;
+#[cfg(feature = "papers")]
+pub mod pu2022;
 pub mod registry;
 #[cfg(feature = "papers")]
 pub mod rotations;

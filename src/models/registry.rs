@@ -6,7 +6,7 @@ use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::{
     baselines::rotations::RotationBaseline, duan2022::Duan2022Kind,
-    harvey2020::Harvey2020RotationsKind, li2023::Li2023Kind, transition::Kind,
+    harvey2020::Harvey2020RotationsKind, li2023::Li2023Kind, pu2022::Pu2022Kind, transition::Kind,
 };
 
 /// Kinds that were [added](add) from outside.
@@ -25,6 +25,8 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(Duan2022Kind),
         #[cfg(feature = "papers")]
         Arc::new(Harvey2020RotationsKind),
+        #[cfg(feature = "papers")]
+        Arc::new(Pu2022Kind),
         #[cfg(feature = "papers")]
         Arc::new(Kind::Interpolation),
         #[cfg(feature = "papers")]

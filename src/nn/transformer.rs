@@ -23,6 +23,8 @@ struct FeedForward {
     linear2: Linear,
     /// GELU in the place of ReLU.
     gelu: bool,
+    /// Dropout between activation and second layer.
+    dropout: f64,
 }
 
 impl FeedForward {
@@ -36,6 +38,7 @@ impl FeedForward {
             linear1: Linear::new(init, &format!("{name}.linear1"), d, wide),
             linear2: Linear::new(init, &format!("{name}.linear2"), wide, d),
             gelu: false,
+            dropout: 0.0,
         }
     }
 
@@ -46,6 +49,10 @@ impl FeedForward {
                 tape.gelu(x)
             }
             false => self.linear1.forward_relu(tape, x)?,
+        };
+        let x = match self.dropout > 0.0 {
+            true => tape.dropout(x, self.dropout),
+            false => x,
         };
         self.linear2.forward(tape, x)
     }
@@ -82,6 +89,13 @@ impl TransformerEncoderLayer {
     #[must_use]
     pub fn with_gelu(mut self) -> Self {
         self.feed_forward.gelu = true;
+        self
+    }
+
+    /// The same with dropout inside the feed-forward part, too, as PyTorch's layer has it.
+    #[must_use]
+    pub fn with_inner_dropout(mut self) -> Self {
+        self.feed_forward.dropout = self.dropout;
         self
     }
 

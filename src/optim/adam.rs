@@ -94,11 +94,18 @@ impl AdamConfig {
         if let Some(norm) = self.clip_norm {
             positive("clip_norm", norm)?;
         }
-        let share = self
-            .rate_schedule
-            .map_or(0.0, |schedule| schedule.final_share);
-        let (key, valid) = ("rate_schedule.final_share", (0.0..=1.0).contains(&share));
-        unless(valid, key, share, "at least 0 and at most 1")
+        let schedule = self.rate_schedule.unwrap_or_default();
+        let [first, second] = schedule.drops;
+        for (key, share) in [
+            ("final_share", schedule.final_share),
+            ("drops", first),
+            ("drops", second),
+        ] {
+            let valid = (0.0..=1.0).contains(&share);
+            let key = format!("rate_schedule.{key}");
+            unless(valid, &key, share, "at least 0 and at most 1")?;
+        }
+        Ok(())
     }
 
     /// The rate of a group of weights over that of the others, the same at every step.

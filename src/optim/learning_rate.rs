@@ -11,6 +11,9 @@ pub enum RateShape {
     Constant,
     /// By `1 - p`.
     Linear,
+    /// To a tenth of the rate where p reaches the first of `drops`, to a hundredth at the second;
+    /// `final_share` has no say.
+    Drops,
     /// By `(1 + cos(pi p)) / 2` (Loshchilov and Hutter, 2017, without restarts).
     Cosine,
 }
@@ -26,8 +29,19 @@ pub struct RateSchedule {
     pub shape: RateShape,
     /// Steps of warming up: the k-th of w has k/w of the rate.
     pub warmup_steps: u64,
+    /// Where the rate of the shape `drops` falls, as shares of the remaining steps.
+    #[serde(skip_serializing_if = "are_usual")]
+    pub drops: [f64; 2],
     /// What is left of the learning rate at the end, as a share of it, from 0 to 1.
     pub final_share: f64,
+}
+
+/// After 100,000 and 250,000 of 300,000 steps.
+const USUAL_DROPS: [f64; 2] = [1.0 / 3.0, 5.0 / 6.0];
+
+/// Keys that keep their defaults are left out of a run's config, so that older versions read it.
+fn are_usual(drops: &[f64; 2]) -> bool {
+    *drops == USUAL_DROPS
 }
 
 impl Default for RateSchedule {
@@ -35,6 +49,7 @@ impl Default for RateSchedule {
         Self {
             shape: RateShape::Cosine,
             warmup_steps: 0,
+            drops: USUAL_DROPS,
             final_share: 0.0,
         }
     }
@@ -52,6 +67,10 @@ impl RateSchedule {
         let done = ((step - self.warmup_steps) as f64 / falling as f64).min(1.0);
         let left = match self.shape {
             RateShape::Constant => return 1.0,
+            RateShape::Drops => {
+                let dropped = self.drops.iter().filter(|at| done >= **at).count();
+                return 0.1_f64.powi(dropped as i32);
+            }
             RateShape::Linear => 1.0 - done,
             RateShape::Cosine => (1.0 + (std::f64::consts::PI * done).cos()) / 2.0,
         };

@@ -52,6 +52,10 @@ fn learning_rate(optimiser: &AdamConfig) -> String {
     }
     let shape = match schedule.shape {
         RateShape::Constant => return text,
+        RateShape::Drops => {
+            let drops = schedule.drops.map(|at| format!("{:.0} %", 100.0 * at));
+            return text + &format!(", a tenth after {} and again after {}", drops[0], drops[1]);
+        }
         RateShape::Linear => "linearly",
         RateShape::Cosine => "as a cosine",
     };

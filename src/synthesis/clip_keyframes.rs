@@ -13,10 +13,10 @@ use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::{Clip, ContactRule, Feet, Foot, Mapping, Pose};
 
 /// A file that was read.
-struct Source {
-    clip: Clip,
+pub(super) struct Source {
+    pub clip: Clip,
     /// The file's channels, where it was not mapped and every joint turns.
-    channels: Option<Vec<Vec<Channel>>>,
+    pub channels: Option<Vec<Vec<Channel>>>,
 }
 
 /// The keyframes of a result with the files that they come from.
@@ -140,7 +140,7 @@ impl ClipKeyframes {
     }
 }
 
-fn read(
+pub(super) fn read(
     path: &Path,
     mapping: Option<&Mapping>,
     data: &DataConfig,
@@ -158,7 +158,7 @@ fn read(
     Ok((Source { clip, channels }, notices))
 }
 
-fn no_frame(clip: &Clip, frame: usize) -> SynthesisError {
+pub(super) fn no_frame(clip: &Clip, frame: usize) -> SynthesisError {
     SynthesisError::NoFrame {
         clip: clip.name.clone(),
         frame,

@@ -17,7 +17,85 @@ use crate::motion::{Clip, Mapping, MappingError};
 /// Frames of a result at most: an hour at 30 a second.
 pub const LONGEST: u32 = 108_000;
 
-/// A frame of a file as a keyframe: "FILE.bvh:FRAME@TIME".
+/// A time of the result: "375", frames, or "12.5s", seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Time {
+    Frame(usize),
+    Seconds(f64),
+}
+
+impl FromStr for Time {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let beyond = |frames: f64| frames > f64::from(LONGEST);
+        let time = match text.strip_suffix('s') {
+            Some(seconds) => seconds.trim().parse().ok().map(Self::Seconds),
+            None => text.parse().ok().map(Self::Frame),
+        };
+        match time {
+            Some(Self::Frame(frame)) if beyond(frame as f64) => {
+                Err(format!("TIME {frame} is beyond {LONGEST} frames"))
+            }
+            Some(Self::Seconds(seconds)) if !(0.0..=86_400.0).contains(&seconds) => {
+                Err(format!("TIME {seconds}s is not from 0 to 86400 seconds"))
+            }
+            Some(time) => Ok(time),
+            None => Err("expected a frame such as 375, or seconds such as 12.5s".into()),
+        }
+    }
+}
+
+impl Time {
+    /// The nearest frame at so many a second.
+    pub fn frame(self, fps: f64) -> usize {
+        match self {
+            Self::Frame(frame) => frame,
+            Self::Seconds(seconds) => (seconds * fps).round() as usize,
+        }
+    }
+}
+
+/// A frame of a file, and when it is to be met: "FILE.bvh:FRAME@TIME".
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimedFrame {
+    pub file: PathBuf,
+    /// Frame of the file at the data's rate.
+    pub frame: usize,
+    pub time: Time,
+}
+
+impl FromStr for TimedFrame {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "expected FILE.bvh:FRAME@TIME, FRAME a whole number from 0 on, TIME one or \
+                        seconds such as 12.5s";
+        let (rest, time) = text.rsplit_once('@').ok_or(expected)?;
+        let (file, frame) = rest.rsplit_once(':').ok_or(expected)?;
+        let frame = frame.trim().parse().map_err(|_| expected)?;
+        let file = Some(PathBuf::from(file)).filter(|file| !file.as_os_str().is_empty());
+        Ok(Self {
+            file: file.ok_or(expected)?,
+            frame,
+            time: time.parse()?,
+        })
+    }
+}
+
+impl TimedFrame {
+    /// The same at so many frames a second.
+    pub fn at(&self, fps: f64) -> FileKeyframe {
+        FileKeyframe {
+            file: self.file.clone(),
+            frame: self.frame,
+            time: self.time.frame(fps),
+        }
+    }
+}
+
+/// A frame of a file as a keyframe.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileKeyframe {
     pub file: PathBuf,
@@ -25,26 +103,6 @@ pub struct FileKeyframe {
     pub frame: usize,
     /// Frame of the result.
     pub time: usize,
-}
-
-impl FromStr for FileKeyframe {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = || {
-            let (rest, time) = text.rsplit_once('@')?;
-            let (file, frame) = rest.rsplit_once(':')?;
-            let (frame, time) = (frame.trim().parse().ok()?, time.trim().parse().ok()?);
-            let file = Some(PathBuf::from(file)).filter(|file| !file.as_os_str().is_empty())?;
-            Some(Self { file, frame, time })
-        };
-        let keyframe =
-            parts().ok_or("expected FILE.bvh:FRAME@TIME with whole numbers from 0 on")?;
-        if keyframe.time > LONGEST as usize {
-            return Err(format!("TIME {} is beyond {LONGEST} frames", keyframe.time));
-        }
-        Ok(keyframe)
-    }
 }
 
 /// Which keyframes a result has.
@@ -74,6 +132,15 @@ impl KeyframeChoice {
 pub struct FileFrom {
     pub file: PathBuf,
     pub frame: usize,
+    /// Whether FRAME was said.
+    said: bool,
+}
+
+impl FileFrom {
+    /// The frame, where it was said.
+    pub fn given(&self) -> Option<usize> {
+        self.said.then_some(self.frame)
+    }
 }
 
 impl FromStr for FileFrom {
@@ -82,9 +149,10 @@ impl FromStr for FileFrom {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let framed = text.rsplit_once(':');
         let framed = framed.and_then(|(file, frame)| Some((file, frame.parse().ok()?)));
+        let said = framed.is_some();
         let (file, frame) = framed.unwrap_or((text, 0));
         let file = file.into();
-        Ok(Self { file, frame })
+        Ok(Self { file, frame, said })
     }
 }
 

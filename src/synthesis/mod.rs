@@ -16,6 +16,7 @@ mod motion;
 mod request;
 mod retarget;
 mod sequence;
+pub mod song;
 mod summary;
 mod warning;
 

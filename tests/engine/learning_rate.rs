@@ -8,7 +8,23 @@ fn schedule(shape: RateShape) -> RateSchedule {
         shape,
         warmup_steps: 4,
         final_share: 0.1,
+        ..RateSchedule::default()
     }
+}
+
+#[test]
+fn drops_leave_a_tenth_and_a_hundredth_of_the_rate() {
+    let schedule = RateSchedule {
+        drops: [0.25, 0.5],
+        ..schedule(RateShape::Drops)
+    };
+    let share = |step| schedule.share(step, 104);
+    assert_eq!(
+        [share(0), share(3), share(4), share(28)],
+        [0.25, 1.0, 1.0, 1.0]
+    );
+    assert_eq!([share(29), share(53)], [0.1; 2]);
+    assert!((share(54) - 0.01).abs() < 1e-15 && share(54) == share(103));
 }
 
 #[test]
@@ -44,7 +60,7 @@ proptest! {
         ],
         warmup_steps in 0u64..50, final_share in 0.0..1.0f64, steps in 1u64..200,
     ) {
-        let schedule = RateSchedule { shape, warmup_steps, final_share };
+        let schedule = RateSchedule { shape, warmup_steps, final_share, ..RateSchedule::default() };
         let shares: Vec<f64> = (0..steps).map(|step| schedule.share(step, steps)).collect();
         for (step, pair) in shares.windows(2).enumerate() {
             if (step as u64 + 1) < warmup_steps {

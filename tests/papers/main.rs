@@ -29,6 +29,7 @@ mod metrics;
 mod pan2021;
 mod preferred;
 mod prior;
+mod pu2022;
 mod published;
 mod ranges;
 mod root_frame;

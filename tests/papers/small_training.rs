@@ -130,6 +130,7 @@ pub fn dataset() -> Dataset {
         validation: Vec::new(),
         test,
         digest: "synthetic".into(),
+        named_frames: Default::default(),
         warnings: Vec::new(),
     }
 }

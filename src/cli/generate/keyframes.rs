@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::cli::list::within;
-use crate::synthesis::keyframes::{FileKeyframe, KeyframeChoice, LONGEST};
+use crate::synthesis::keyframes::{KeyframeChoice, LONGEST, TimedFrame};
 
 #[derive(Debug, Args)]
 pub struct KeyframeArgs {
@@ -18,10 +18,10 @@ pub struct KeyframeArgs {
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion",
         value_parser = within(0..=usize::MAX))]
     keyframes: Vec<usize>,
-    /// A frame of any file as a keyframe, and its frame in the result, such as jump.bvh:75@60; may
-    /// be repeated
+    /// A frame of any file as a keyframe, and its time in the result, a frame such as jump.bvh:75@60
+    /// or seconds such as jump.bvh:75@12.5s; may be repeated
     #[arg(long, value_name = "FILE.bvh:FRAME@TIME")]
-    keyframe: Vec<FileKeyframe>,
+    keyframe: Vec<TimedFrame>,
     /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's]
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
@@ -33,11 +33,12 @@ pub struct KeyframeArgs {
 }
 
 impl KeyframeArgs {
-    pub fn choice(&self) -> KeyframeChoice {
+    /// For results of so many frames a second.
+    pub fn choice(&self, fps: f64) -> KeyframeChoice {
         let motion = self.motion.clone();
         KeyframeChoice {
             motion: motion.map(|file| (file, self.keyframes.clone())),
-            further: self.keyframe.clone(),
+            further: self.keyframe.iter().map(|it| it.at(fps)).collect(),
             mapping: self.mapping.clone(),
         }
     }

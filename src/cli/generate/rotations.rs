@@ -52,7 +52,7 @@ pub fn run(args: &GenerateArgs, subject: &Subject) -> anyhow::Result<()> {
         .map(|it| format!("the model does not read {}: left out", it.title()))
         .collect();
     let data = args.units.over(&subject.config.data);
-    let keyframes = ClipKeyframes::read(&args.keyframes.choice(), &data)?;
+    let keyframes = ClipKeyframes::read(&args.keyframes.choice(data.fps), &data)?;
     warn(keyframes.notices());
     let mut drawn = Streams::new(args.contacts.seed).stream("contact_foot", &[]);
     let draw = || match drawn.random() {

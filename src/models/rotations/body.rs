@@ -98,7 +98,7 @@ impl Body {
 
     /// As numbers that are saved beside the weights: parents (-1: none), and the names as UTF-8
     /// bytes with a line end after each.
-    pub(super) fn statistics(&self, statistics: Statistics) -> Statistics {
+    pub(in crate::models) fn statistics(&self, statistics: Statistics) -> Statistics {
         let parents = self.parents().into_iter();
         let parents: Vec<f64> = parents
             .map(|parent| parent.map_or(-1.0, |parent| parent as f64))
@@ -115,7 +115,7 @@ impl Body {
     ///
     /// # Errors
     /// It is not there, or is none.
-    pub(super) fn saved(saved: &SavedWeights) -> Result<Self, WeightsError> {
+    pub(in crate::models) fn saved(saved: &SavedWeights) -> Result<Self, WeightsError> {
         let refused = |problem: &str| {
             WeightsError::Refused(format!("{}: {NAMES} {problem}", saved.path.display()))
         };

@@ -1,0 +1,58 @@
+//! Music-driven dance regeneration with controllable key pose constraints (Pu and Shan 2022): a
+//! dance from a song, a seed of motion and a few key poses.
+//!
+//! - `config`: sizes, ablations and open points;
+//! - `window`: a window in numbers (section 3.1), `batch`: several as arrays, with local positions
+//!   (eq. 8 to 10) and the weights of frames (eq. 15);
+//! - `network`: encoders, cross-modal Transformer (eq. 5, 6, 11), loss (eq. 14);
+//! - `clips`, `task`: the windows that are trained;
+//! - `generator`: windows that slide over a song.
+//!
+//! `docs/pu2022.md` fixes shapes, names and units.
+
+mod batch;
+mod clips;
+mod config;
+mod generator;
+mod made_up;
+mod network;
+mod settings;
+mod task;
+mod window;
+
+pub use batch::{Batch, GivenWindow, frame_weights};
+pub use clips::{DrawnWindow, MusicStatistics, draw, draw_keys};
+pub use config::{
+    AugmentationConfig, LossConfig, MusicConfig, MusicSpan, Norm, Pu2022Config, Pu2022Settings,
+    ScheduleConfig, WindowConfig,
+};
+pub use generator::TrainedPu2022;
+pub use network::Pu2022;
+pub use window::{WindowFrame, pose_of};
+
+use toml::Table;
+
+use crate::models::settings::{ModelKind, ModelSettings, Paper};
+
+/// The line of the registry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pu2022Kind;
+
+impl ModelKind for Pu2022Kind {
+    fn name(&self) -> &str {
+        "pu2022"
+    }
+
+    fn papers(&self) -> Vec<Paper> {
+        Vec::new()
+    }
+
+    fn defaults(&self) -> Table {
+        // The defaults hold numbers that TOML has, which a test proves.
+        Table::try_from(Pu2022Settings::default()).unwrap_or_default()
+    }
+
+    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
+        Ok(Box::new(tables.try_into::<Pu2022Settings>()?))
+    }
+}

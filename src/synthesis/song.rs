@@ -1,0 +1,410 @@
+//! A dance to a song, from a seed and a few key poses, by a model that hears.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::clip_keyframes::{Source, no_frame, read};
+use super::keyframes::{FileFrom, FileKeyframe, KeyframeError, LONGEST};
+use crate::counted::counted;
+use crate::data::DataConfig;
+use crate::models::generator::{Given, Motion, NeededPoses, Request};
+use crate::models::{Generator, ModelError};
+use crate::motion::bvh::{Axis, Bvh, BvhError, channel_layout};
+use crate::motion::{Clip, Mapping, MappingError, Pose};
+use crate::music::{Analysis, Cache, FRAME_RATE, MusicError};
+
+/// Key poses nearer to the seed than this get a warning, frames.
+const NEAR: usize = 5;
+
+/// What the dance goes on from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Seed {
+    /// Frames of a clip: from one on, or the last ones.
+    Motion(PathBuf, Option<usize>),
+    /// One pose, held.
+    Pose(FileFrom),
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SongChoice {
+    pub music: PathBuf,
+    pub seed: Seed,
+    pub key_poses: Vec<FileKeyframe>,
+    /// Frames of the result, where it is to be shorter than the song.
+    pub frames: Option<usize>,
+    /// For clips on another skeleton, in place of the data's.
+    pub mapping: Option<PathBuf>,
+}
+
+/// Why there is no dance to a song.
+#[derive(Debug, Error)]
+pub enum SongError {
+    #[error(transparent)]
+    Music(#[from] MusicError),
+    #[error(transparent)]
+    Keyframe(#[from] KeyframeError),
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error("{model} does not dance to music from a seed; give --keyframe or --motion alone")]
+    Deaf { model: String },
+    #[error(
+        "the model's data has {fps} frames a second and music is heard at {FRAME_RATE}; such a model \
+         cannot dance to a song"
+    )]
+    Rate { fps: f64 },
+    #[error(
+        "{song} has {}, the seed alone {}: give a longer song", counted(*frames, "frame"),
+        counted(*seed, "frame")
+    )]
+    Short {
+        song: PathBuf,
+        frames: usize,
+        seed: usize,
+    },
+    #[error("{song} has {}, beyond {LONGEST}; cut it", counted(*frames, "frame"))]
+    Long { song: PathBuf, frames: usize },
+    #[error(
+        "{file} has {} from frame {first} on, the model goes on from {}; give a longer clip, or one \
+         pose with --seed-pose", counted(*found, "frame"), counted(*needed, "frame")
+    )]
+    ShortSeed {
+        file: PathBuf,
+        first: usize,
+        found: usize,
+        needed: usize,
+    },
+    #[error(
+        "the key pose {key} lies beyond the dance, whose last frame is {last} ({:.2} s)",
+        *last as f64 / FRAME_RATE
+    )]
+    Beyond { key: String, last: usize },
+    #[error(
+        "the key pose {key} lies in the seed, whose last frame is {last} ({:.2} s); give a later time",
+        *last as f64 / FRAME_RATE
+    )]
+    InSeed { key: String, last: usize },
+    #[error("two key poses stand at frame {frame} of the result, {} and {}; keep one", keys[0], keys[1])]
+    Twice { frame: usize, keys: [String; 2] },
+    #[error("{model} gave no rotations")]
+    NoRotations { model: String },
+}
+
+/// A song, a seed and key poses, read.
+pub struct Song {
+    /// What the model is asked.
+    pub request: Request,
+    pub music: Analysis,
+    /// T', frames of the seed.
+    pub seed: usize,
+    /// The seed is one pose, held.
+    pub held: bool,
+    /// What is odd about the files and what was asked for, a sentence each.
+    pub notices: Vec<String>,
+    first: Source,
+}
+
+impl Song {
+    /// Reads the files of a choice for a model, in the unit, axis and rate of `data`.
+    ///
+    /// # Errors
+    /// A model that does not go on from a seed, a file that cannot be read, a song shorter than the
+    /// seed, key poses that are not in the dance.
+    pub fn read(
+        choice: &SongChoice,
+        model: &dyn Generator,
+        data: &DataConfig,
+        cache: &Cache,
+    ) -> Result<Self, SongError> {
+        let NeededPoses::Seed(needed) = model.needs().poses else {
+            let model = model.name().into();
+            return Err(SongError::Deaf { model });
+        };
+        if data.fps != FRAME_RATE {
+            return Err(SongError::Rate { fps: data.fps });
+        }
+        let heard = cache.analysis(&choice.music)?;
+        let named = |notice| format!("{}: {notice}", choice.music.display());
+        let mut notices: Vec<String> = heard.warnings.into_iter().map(named).collect();
+        let music = heard.analysis;
+        let frames = music.frames().min(choice.frames.unwrap_or(usize::MAX));
+        let song = || choice.music.clone();
+        if frames <= needed {
+            return Err(SongError::Short {
+                song: song(),
+                frames,
+                seed: needed,
+            });
+        }
+        if frames > LONGEST as usize {
+            return Err(SongError::Long {
+                song: song(),
+                frames,
+            });
+        }
+        let mapping = match &choice.mapping {
+            Some(path) => Some(Mapping::read(path)?),
+            None => data.mapping.clone(),
+        };
+        let data = DataConfig {
+            skip_frames: 0,
+            ..data.clone()
+        };
+        let mut files = Files {
+            mapping,
+            data,
+            read: BTreeMap::new(),
+            notices: Vec::new(),
+        };
+        let (seed, held) = files.seed(&choice.seed, needed)?;
+        let keys = files.key_poses(&choice.key_poses, &seed[0], needed, frames)?;
+        notices.append(&mut files.notices);
+        let near = keys.iter().filter(|(frame, _)| *frame < needed + NEAR);
+        notices.extend(near.map(|(frame, _)| {
+            format!("the key pose at frame {frame} comes within {NEAR} frames of the seed's end")
+        }));
+        let path = match &choice.seed {
+            Seed::Motion(path, _) => path,
+            Seed::Pose(from) => &from.file,
+        };
+        let first = files.read.remove(path).ok_or(KeyframeError::None)?;
+        let seed = seed.into_iter().enumerate();
+        let given = seed.chain(keys).map(|(frame, pose)| Given {
+            frame: frame as i64,
+            pose,
+            features: None,
+        });
+        let heard = music.features(model.music_features());
+        let heard = heard.slice(ndarray::s![..frames, ..]).mapv(f64::from);
+        let request = Request {
+            given: given.collect(),
+            music: Some(heard),
+            ..Request::new(first.clip.skeleton.clone(), first.clip.frame_time, frames)
+        };
+        Ok(Self {
+            request,
+            music,
+            seed: needed,
+            held,
+            notices,
+            first,
+        })
+    }
+
+    /// The dance that a model makes of it, as a clip `name`, and how well it meets its key poses.
+    ///
+    /// # Errors
+    /// The model fails, or gives no rotations.
+    pub fn dance(
+        &self,
+        model: &dyn Generator,
+        name: &str,
+    ) -> Result<(Clip, SongSummary), SongError> {
+        let motions = model.generate(std::slice::from_ref(&self.request))?;
+        let no_rotations = || SongError::NoRotations {
+            model: model.name().into(),
+        };
+        let motion = motions.into_iter().next().ok_or_else(no_rotations)?;
+        motion.check(&self.request)?;
+        let Motion { poses, .. } = motion;
+        let clip = Clip {
+            name: name.into(),
+            skeleton: self.request.skeleton.clone(),
+            frame_time: self.request.frame_time,
+            poses: poses.ok_or_else(no_rotations)?,
+        };
+        let summary = self.summary(model.name(), &clip);
+        Ok((clip, summary))
+    }
+
+    fn summary(&self, model: &str, clip: &Clip) -> SongSummary {
+        let keys = self.request.given.iter();
+        let keys = keys.filter(|given| given.frame >= self.seed as i64);
+        let about_root = |pose: &Pose| -> Vec<DVec3> {
+            let world = pose.world_positions(&clip.skeleton);
+            world.iter().map(|joint| *joint - world[0]).collect()
+        };
+        let key_poses = keys.map(|given| {
+            let frame = given.frame as usize;
+            // Where the key pose looks is met too, so both are compared in the world's orientation.
+            let (own, wanted) = (about_root(&clip.poses[frame]), about_root(&given.pose));
+            let distances = own.iter().zip(&wanted).map(|(a, b)| a.distance(*b));
+            KeyPoseMiss {
+                frame,
+                seconds: frame as f64 / FRAME_RATE,
+                distance: distances.sum::<f64>() / own.len() as f64,
+            }
+        });
+        SongSummary {
+            model: model.into(),
+            frames: clip.poses.len(),
+            seconds: clip.poses.len() as f64 / FRAME_RATE,
+            tempo: self.music.tempo,
+            metre: self.music.metre,
+            seed_frames: self.seed,
+            seed_is_held: self.held,
+            key_poses: key_poses.collect(),
+        }
+    }
+
+    /// A dance as a file's content: with the channels of the seed's file, or with Z X Y rotations
+    /// where these cannot hold it.
+    ///
+    /// # Errors
+    /// The clip is not one that a file could hold.
+    pub fn document(&self, dance: &Clip) -> Result<Bvh, BvhError> {
+        let channels = self.first.channels.clone();
+        let channels =
+            channels.unwrap_or_else(|| channel_layout(dance, [Axis::Z, Axis::X, Axis::Y]));
+        Bvh::from_clip(dance, channels)
+    }
+}
+
+/// The files of a choice as they are read.
+struct Files {
+    mapping: Option<Mapping>,
+    data: DataConfig,
+    read: BTreeMap<PathBuf, Source>,
+    notices: Vec<String>,
+}
+
+impl Files {
+    fn clip(&mut self, path: &Path) -> Result<&Clip, KeyframeError> {
+        if !self.read.contains_key(path) {
+            let (source, own) = read(path, self.mapping.as_ref(), &self.data)?;
+            self.notices.extend(own);
+            self.read.insert(path.into(), source);
+        }
+        Ok(&self.read[path].clip)
+    }
+
+    fn pose(&mut self, path: &Path, frame: usize) -> Result<Pose, KeyframeError> {
+        let clip = self.clip(path)?;
+        let pose = clip.poses.get(frame).cloned();
+        Ok(pose.ok_or_else(|| no_frame(clip, frame))?)
+    }
+
+    /// The seed's poses `[needed]`, and whether they are one that is held.
+    fn seed(&mut self, seed: &Seed, needed: usize) -> Result<(Vec<Pose>, bool), SongError> {
+        match seed {
+            Seed::Pose(FileFrom { file, frame, .. }) => {
+                Ok((vec![self.pose(file, *frame)?; needed], true))
+            }
+            Seed::Motion(file, first) => {
+                let clip = self.clip(file)?;
+                let last = clip.poses.len().saturating_sub(needed);
+                let first = first.unwrap_or(last);
+                let poses = clip.poses.get(first..first + needed);
+                let poses = poses.ok_or_else(|| SongError::ShortSeed {
+                    file: file.clone(),
+                    first,
+                    found: clip.poses.len().saturating_sub(first),
+                    needed,
+                })?;
+                Ok((poses.to_vec(), false))
+            }
+        }
+    }
+
+    /// Key poses by frame, on the bones of the seed's dancer.
+    fn key_poses(
+        &mut self,
+        asked: &[FileKeyframe],
+        dancer: &Pose,
+        seed: usize,
+        frames: usize,
+    ) -> Result<Vec<(usize, Pose)>, SongError> {
+        let title = |key: &FileKeyframe| {
+            let FileKeyframe { file, frame, time } = key;
+            format!("{}:{frame}@{time}", file.display())
+        };
+        let mut asked: Vec<&FileKeyframe> = asked.iter().collect();
+        asked.sort_by_key(|key| key.time);
+        if let Some(pair) = asked.windows(2).find(|pair| pair[0].time == pair[1].time) {
+            return Err(SongError::Twice {
+                frame: pair[0].time,
+                keys: [title(pair[0]), title(pair[1])],
+            });
+        }
+        let mut keys = Vec::new();
+        for key in asked {
+            if key.time >= frames {
+                let (key, last) = (title(key), frames - 1);
+                return Err(SongError::Beyond { key, last });
+            }
+            if key.time < seed {
+                let (key, last) = (title(key), seed - 1);
+                return Err(SongError::InSeed { key, last });
+            }
+            let mut pose = self.pose(&key.file, key.frame)?;
+            if pose.translations.len() != dancer.translations.len() {
+                let files = [key.file.display().to_string(), "the seed's file".into()];
+                let joints = [pose.translations.len(), dancer.translations.len()];
+                return Err(KeyframeError::OtherJoints { files, joints }.into());
+            }
+            pose.translations[1..].clone_from_slice(&dancer.translations[1..]);
+            keys.push((key.time, pose));
+        }
+        Ok(keys)
+    }
+}
+
+/// The numbers of a dance to a song: as text and as JSON.
+#[derive(Debug, Serialize)]
+pub struct SongSummary {
+    model: String,
+    frames: usize,
+    seconds: f64,
+    /// Beats a minute.
+    tempo: f64,
+    /// Beats of a bar.
+    metre: usize,
+    seed_frames: usize,
+    seed_is_held: bool,
+    key_poses: Vec<KeyPoseMiss>,
+}
+
+#[derive(Debug, Serialize)]
+struct KeyPoseMiss {
+    frame: usize,
+    seconds: f64,
+    /// Mean distance of the joints from the key pose's, about the root, cm.
+    distance: f64,
+}
+
+impl fmt::Display for SongSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.model)?;
+        let frames = counted(self.frames, "frame");
+        writeln!(f, "{frames}, {:.2} s", self.seconds)?;
+        writeln!(
+            f,
+            "music: {:.1} beats a minute, {} a bar",
+            self.tempo, self.metre
+        )?;
+        let seed = counted(self.seed_frames, "frame");
+        match self.seed_is_held {
+            true => writeln!(f, "seed: one pose held for {seed}")?,
+            false => writeln!(f, "seed: {seed}")?,
+        }
+        for KeyPoseMiss {
+            frame,
+            seconds,
+            distance,
+        } in &self.key_poses
+        {
+            writeln!(
+                f,
+                "key pose at frame {frame} ({seconds:.2} s): joints {distance:.1} cm from it"
+            )?;
+        }
+        Ok(())
+    }
+}
