@@ -61,7 +61,8 @@ pub enum SongError {
     )]
     Rate { fps: f64 },
     #[error(
-        "{song} has {}, the seed alone {}: give a longer song", counted(*frames, "frame"),
+        "a dance of {} to {song} is shorter than the seed, {}: give a longer song, or a later end",
+        counted(*frames, "frame"),
         counted(*seed, "frame")
     )]
     Short {

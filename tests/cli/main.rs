@@ -35,5 +35,6 @@ mod outputs;
 mod report;
 mod reproduce;
 mod rotations;
+mod song;
 mod stopped;
 mod viewer;

@@ -3,9 +3,10 @@
 
 use glam::DVec3;
 use keydance::data::choreography::{
-    ChoreographyConfig, ChoreographyError, GeneratedClip, generate,
+    ChoreographyConfig, ChoreographyError, GeneratedClip, generate, generate_with_music,
 };
 use keydance::motion::skeleton::JOINTS;
+use keydance::music::{Analysis, Sound};
 use proptest::prelude::*;
 
 const FEET: [usize; 4] = [3, 4, 7, 8];
@@ -250,4 +251,35 @@ fn an_unknown_key_in_the_configuration_is_named() {
             ..ChoreographyConfig::default()
         }
     );
+}
+
+#[test]
+fn music_is_on_the_dances_beats_and_the_tracker_finds_95_of_100_within_a_frame() {
+    let config = ChoreographyConfig {
+        clips: 12,
+        frames_per_clip: 900,
+        seed: 3,
+    };
+    let dances = generate_with_music(&config).unwrap();
+    let (mut found, mut all) = (0, 0);
+    let mut metres = std::collections::BTreeSet::new();
+    let mut phases = std::collections::BTreeSet::new();
+    for dance in &dances {
+        assert_eq!(dance.dance.clip.poses.len(), 900);
+        assert_eq!(dance.samples.len(), 900 * 735);
+        assert!(dance.samples.iter().all(|x| x.abs() < 1.0));
+        let sound = Sound::new("made", &dance.samples, 22_050).unwrap();
+        let heard = Analysis::of(&sound).unwrap();
+        let near = |beat: &&usize| heard.beats.iter().any(|it| it.abs_diff(**beat) <= 1);
+        // The tracker's trimming leaves out beats at the ends, where there is no music beyond.
+        let inside = &dance.beats[1..dance.beats.len() - 1];
+        found += inside.iter().filter(near).count();
+        all += inside.len();
+        metres.insert(dance.metre);
+        phases.insert(dance.beats[0]);
+    }
+    assert!(found as f64 > 0.95 * all as f64, "{found} of {all}");
+    assert_eq!(metres.into_iter().collect::<Vec<_>>(), [3, 4]);
+    assert!(phases.len() > 4, "{phases:?}");
+    assert_eq!(dances, generate_with_music(&config).unwrap());
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 use keydance::synthesis::controls::{Gains, Points, read_trajectory};
-use keydance::synthesis::keyframes::FileKeyframe;
+use keydance::synthesis::keyframes::TimedFrame;
 use proptest::prelude::*;
 
 #[test]
@@ -86,9 +86,11 @@ fn points_have_two_or_three_numbers_each() {
 
 #[test]
 fn a_keyframe_is_taken_apart_from_its_end() {
-    let keyframe = FileKeyframe::from_str("a:b@c.bvh:75@60").unwrap();
+    let keyframe = TimedFrame::from_str("a:b@c.bvh:75@60").unwrap().at(30.0);
     assert_eq!(keyframe.file, PathBuf::from("a:b@c.bvh"));
     assert_eq!((keyframe.frame, keyframe.time), (75, 60));
+    let seconds = TimedFrame::from_str("c.bvh:75@12.5s").unwrap();
+    assert_eq!((seconds.at(30.0).time, seconds.at(25.0).time), (375, 313));
     for bad in [
         "a.bvh",
         "a.bvh:1",
@@ -96,9 +98,13 @@ fn a_keyframe_is_taken_apart_from_its_end() {
         "a.bvh:-1@3",
         "a.bvh:1@x",
         ":1@2",
+        "a.bvh:1@s",
+        "a.bvh:1@-1s",
+        "a.bvh:1@nans",
+        "a.bvh:1@1e9s",
         "a.bvh:1@999999999",
         "a.bvh:1@18446744073709551615",
     ] {
-        assert!(FileKeyframe::from_str(bad).is_err(), "{bad}");
+        assert!(TimedFrame::from_str(bad).is_err(), "{bad}");
     }
 }

@@ -11,6 +11,8 @@ mod body;
 mod curve;
 mod feet;
 mod figures;
+#[cfg(feature = "music")]
+mod music;
 mod pelvis;
 mod rhythm;
 mod score;
@@ -23,6 +25,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::motion::Clip;
+#[cfg(feature = "music")]
+pub use music::{DanceWithMusic, generate_with_music};
 
 use feet::{Foot, FootPose};
 use figures::Family;
@@ -103,6 +107,12 @@ pub fn generate(config: &ChoreographyConfig) -> Result<Vec<GeneratedClip>, Chore
 pub fn clips(
     config: &ChoreographyConfig,
 ) -> Result<impl Iterator<Item = GeneratedClip> + use<>, ChoreographyError> {
+    check(config)?;
+    let (frames, seed) = (config.frames_per_clip, config.seed);
+    Ok((0..config.clips).map(move |number| dance_of(number, frames, seed).0))
+}
+
+fn check(config: &ChoreographyConfig) -> Result<(), ChoreographyError> {
     if config.clips == 0 {
         return Err(ChoreographyError::NoClips);
     }
@@ -116,19 +126,19 @@ pub fn clips(
             frames: config.frames_per_clip,
         });
     }
-    let (frames, seed) = (config.frames_per_clip, config.seed);
-    Ok((0..config.clips).map(move |number| dance(number, frames, seed)))
+    Ok(())
 }
 
-/// One clip, on a random stream of its own.
-fn dance(number: usize, frames: usize, seed: u64) -> GeneratedClip {
+/// One clip, on a random stream of its own, with its rhythm and the beats of a bar.
+fn dance_of(number: usize, frames: usize, seed: u64) -> (GeneratedClip, Rhythm, f64) {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     rng.set_stream(number as u64);
     let style = Style::draw(number, &mut rng);
     let name = format!("choreography_{number:03}_{}.bvh", style.name);
     let rhythm = Rhythm::new(style.draw_tempo(&mut rng), style.rubato, &mut rng);
     let heading = rng.random_range(0.0..std::f64::consts::TAU);
-    let mut score = Score::new(style, rhythm, heading);
+    let bar = style.bar;
+    let mut score = Score::new(style, rhythm.clone(), heading);
     let mut last: Option<Family> = None;
     while score.frame(0.0) < frames as f64 {
         if score.centre.length() > FARTHEST {
@@ -155,10 +165,11 @@ fn dance(number: usize, frames: usize, seed: u64) -> GeneratedClip {
         frame_time: 1.0 / FRAME_RATE,
         poses,
     };
-    GeneratedClip {
+    let dance = GeneratedClip {
         clip,
         contacts: contacts(&feet),
-    }
+    };
+    (dance, rhythm, bar)
 }
 
 fn contacts(feet: &[Vec<FootPose>; 2]) -> Vec<[bool; 4]> {

@@ -1,0 +1,195 @@
+//! Dances to a song through the binary: generated dances with their music, a model trained on them,
+//! whole songs with key poses at seconds of them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use assert_cmd::Command;
+use keydance::motion::bvh;
+use predicates::str::contains;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::trained_run::keydance;
+
+const CONFIG: &str = "name = 'pu'\n[data]\nsplit = { share = 0.8 }\nmusic = true\n\
+    [model]\nkind = 'pu2022'\nwidth = 8\nheads = 2\nmotion_layers = 1\nmusic_layers = 1\n\
+    cross_layers = 1\nfeed_forward = 8\n\
+    [window]\nseed = 20\nlength = 60\n\
+    [schedule]\nsteps = 4\nbatch_size = 2\nkey_poses = 2\n";
+
+/// Five dances of 240 frames with music in `data`, and a run.
+struct Fixture {
+    folder: TempDir,
+}
+
+static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    let fixture = Fixture { folder };
+    let mut command = fixture.command("choreography");
+    command.args(["--music", "--clips", "5", "--frames", "240", "--seed", "4"]);
+    command.arg("--out").arg(fixture.path("data"));
+    command.assert().success();
+    fs::write(fixture.path("pu.toml"), CONFIG).unwrap();
+    fixture.train("run").assert().success();
+    fixture
+});
+
+impl Fixture {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// With a cache of its own.
+    fn command(&self, name: &str) -> Command {
+        let mut command = keydance(name);
+        command.env("XDG_CACHE_HOME", self.path("cache"));
+        command
+    }
+
+    fn train(&self, run: &str) -> Command {
+        let mut command = self.command("train");
+        command.arg(self.path("pu.toml"));
+        command.arg("--data").arg(self.path("data"));
+        command.arg("--out").arg(self.path(run));
+        command
+    }
+
+    /// The `index`-th file of the data with this ending.
+    fn file(&self, index: usize, ending: &str) -> PathBuf {
+        let entries = fs::read_dir(self.path("data")).unwrap();
+        let paths = entries.map(|entry| entry.unwrap().path());
+        let mut files: Vec<PathBuf> = paths
+            .filter(|path| path.extension().is_some_and(|it| it == ending))
+            .collect();
+        files.sort();
+        files[index].clone()
+    }
+
+    /// `keydance generate` to the first song, from the start of its dance.
+    fn generate(&self, out: &Path) -> Command {
+        let mut command = self.command("generate");
+        command.arg(self.path("run"));
+        command.arg("--music").arg(self.file(0, "wav"));
+        command.arg("--seed-motion");
+        command.arg(format!("{}:0", self.file(0, "bvh").display()));
+        command.arg("--out").arg(out);
+        command
+    }
+
+    fn key(&self, frame_at: &str) -> String {
+        format!("{}:{frame_at}", self.file(1, "bvh").display())
+    }
+}
+
+#[test]
+fn a_whole_song_is_danced_from_the_seed_with_key_poses_at_its_seconds() {
+    let folder = TempDir::new().unwrap();
+    let (out, json) = (
+        folder.path().join("dance.bvh"),
+        folder.path().join("dance.json"),
+    );
+    let mut command = FIXTURE.generate(&out);
+    command.arg("--keyframe").arg(FIXTURE.key("75@4.5s"));
+    command.arg("--keyframe").arg(FIXTURE.key("30@100"));
+    command.arg("--json").arg(&json);
+    let output = command.assert().success();
+    output.stdout(contains("key pose at frame 135 (4.50 s)"));
+    let dance = bvh::read(&out).unwrap().to_clip();
+    let recorded = bvh::read(&FIXTURE.file(0, "bvh")).unwrap().to_clip();
+    assert_eq!(dance.poses.len(), 240);
+    for (pose, seed) in dance.poses.iter().zip(&recorded.poses[..20]) {
+        assert!(pose.translations[0].distance(seed.translations[0]) < 1e-4);
+    }
+    let summary: Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    let keys = summary["key_poses"].as_array().unwrap().iter();
+    let frames: Vec<u64> = keys.map(|key| key["frame"].as_u64().unwrap()).collect();
+    assert_eq!(frames, [100, 135]);
+    assert_eq!(summary["seed_is_held"], false);
+}
+
+#[test]
+fn one_pose_may_be_held_and_the_dance_may_end_before_the_song() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("dance.bvh");
+    let mut command = FIXTURE.command("generate");
+    command.arg(FIXTURE.path("run"));
+    command.arg("--music").arg(FIXTURE.file(2, "wav"));
+    command.arg("--seed-pose").arg(FIXTURE.key("50"));
+    command.args(["--until", "3.5s"]).arg("--out").arg(&out);
+    let output = command.assert().success();
+    output.stdout(contains("seed: one pose held for 20 frames"));
+    let dance = bvh::read(&out).unwrap().to_clip();
+    assert_eq!(dance.poses.len(), 105);
+    assert_eq!(dance.poses[0].rotations, dance.poses[19].rotations);
+}
+
+#[test]
+fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("dance.bvh");
+    let cases: [(&[&str], &str); 6] = [
+        (&["75@8s"], "lies beyond the dance, whose last frame is 239"),
+        (&["75@5"], "lies in the seed, whose last frame is 19"),
+        (&["75@2s", "80@60"], "two key poses stand at frame 60"),
+        (&["75@-1s"], "is not from 0 to 86400 seconds"),
+        (
+            &["75@soon"],
+            "expected a frame such as 375, or seconds such as 12.5s",
+        ),
+        (&["9999@60"], "has no frame 9999"),
+    ];
+    for (keys, message) in cases {
+        let mut command = FIXTURE.generate(&out);
+        for key in keys {
+            command.arg("--keyframe").arg(FIXTURE.key(key));
+        }
+        command.assert().failure().stderr(contains(message));
+        assert!(!out.exists(), "{message}");
+    }
+    let mut command = FIXTURE.generate(&out);
+    command.args(["--until", "10"]);
+    let output = command.assert().failure();
+    output.stderr(contains("is shorter than the seed, 20 frames"));
+    assert!(!out.exists());
+    let mut command = FIXTURE.command("generate");
+    command.arg(FIXTURE.path("run")).arg("--out").arg(&out);
+    command
+        .assert()
+        .failure()
+        .stderr(contains("give --music SONG"));
+}
+
+#[test]
+fn a_dance_without_its_music_and_music_shorter_than_its_dance_are_named() {
+    let folder = TempDir::new().unwrap();
+    let data = folder.path().join("data");
+    fs::create_dir(&data).unwrap();
+    for index in 0..5 {
+        for ending in ["bvh", "wav"] {
+            let file = FIXTURE.file(index, ending);
+            fs::copy(&file, data.join(file.file_name().unwrap())).unwrap();
+        }
+    }
+    let train = || {
+        let mut command = FIXTURE.command("train");
+        command
+            .arg(FIXTURE.path("pu.toml"))
+            .arg("--data")
+            .arg(&data);
+        command.arg("--out").arg(folder.path().join("never"));
+        command.assert().failure()
+    };
+    let song = data.join(FIXTURE.file(3, "wav").file_name().unwrap());
+    let other = data.join("other.wav");
+    fs::rename(&song, &other).unwrap();
+    train().stderr(contains("has no music: data.music = true asks"));
+    let bytes = fs::read(&other).unwrap();
+    // 200 of 240 frames, the header as it was: what is there is heard.
+    fs::write(&song, &bytes[..44 + 200 * 735 * 2]).unwrap();
+    train().stderr(contains("240 frames and its music"));
+    fs::write(&song, &bytes).unwrap();
+    fs::copy(&other, song.with_extension("ogg")).unwrap();
+    train().stderr(contains("are music of one name; keep one of them"));
+}
