@@ -16,6 +16,7 @@ mod list;
 mod music;
 mod notice;
 mod progress;
+mod regenerate;
 mod reproduce;
 mod runs;
 mod stop;
@@ -64,6 +65,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     #[command(after_help = include_str!("help/generate.txt"))]
     Generate(Box<generate::GenerateArgs>),
+    #[command(after_help = include_str!("help/regenerate.txt"))]
+    Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/reproduce.txt"))]
     Reproduce(reproduce::ReproduceArgs),
     /// Set scores beside the paper's in its tables 2 to 4
@@ -112,6 +115,7 @@ impl Cli {
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => return evaluate::run(args),
             Command::Generate(args) => generate::run(*args)?,
+            Command::Regenerate(args) => regenerate::run(args)?,
             Command::Reproduce(args) => return reproduce::run(args),
             Command::Figures(args) => figures::run(args)?,
             Command::Tables(args) => tables::run(args)?,

@@ -13,6 +13,7 @@ mod error;
 mod foot_cleanup;
 pub mod keyframes;
 mod motion;
+pub mod regenerate;
 mod request;
 mod retarget;
 mod sequence;

@@ -199,6 +199,11 @@ impl Song {
         })
     }
 
+    /// Frames of the file that the seed is from.
+    pub fn seed_clip_frames(&self) -> usize {
+        self.first.clip.poses.len()
+    }
+
     /// The dance that a model makes of it, as a clip `name`, and how well it meets its key poses.
     ///
     /// # Errors
@@ -378,6 +383,22 @@ struct KeyPoseMiss {
     seconds: f64,
     /// Mean distance of the joints from the key pose's, about the root, cm.
     distance: f64,
+}
+
+impl SongSummary {
+    /// How many key poses there are and how far the dance is from them on average.
+    pub fn about_key_poses(&self) -> String {
+        let count = self.key_poses.len();
+        let distances = self.key_poses.iter().map(|key| key.distance);
+        let mean = distances.sum::<f64>() / count.max(1) as f64;
+        match count {
+            0 => "no key poses".into(),
+            _ => format!(
+                "{}, joints {mean:.1} cm from them",
+                counted(count, "key pose")
+            ),
+        }
+    }
 }
 
 impl fmt::Display for SongSummary {

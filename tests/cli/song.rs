@@ -11,7 +11,9 @@ use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::browser;
 use crate::trained_run::keydance;
+use crate::viewer_page::page_data;
 
 const CONFIG: &str = "name = 'pu'\n[data]\nsplit = { share = 0.8 }\nmusic = true\n\
     [model]\nkind = 'pu2022'\nwidth = 8\nheads = 2\nmotion_layers = 1\nmusic_layers = 1\n\
@@ -192,4 +194,84 @@ fn a_dance_without_its_music_and_music_shorter_than_its_dance_are_named() {
     fs::write(&song, &bytes).unwrap();
     fs::copy(&other, song.with_extension("ogg")).unwrap();
     train().stderr(contains("are music of one name; keep one of them"));
+}
+
+#[test]
+fn a_recorded_dance_is_regenerated_from_random_key_poses_of_it() {
+    let folder = TempDir::new().unwrap();
+    let regenerate = |out: &Path, seed: &str| {
+        let mut command = FIXTURE.command("regenerate");
+        command.arg(FIXTURE.path("run")).arg(FIXTURE.file(0, "bvh"));
+        command
+            .args(["--count", "2", "--seed", seed])
+            .arg("--out")
+            .arg(out);
+        command
+    };
+    let [first, again, other] = ["first", "again", "other"].map(|name| folder.path().join(name));
+    let output = regenerate(&first, "1").assert().success();
+    output.stdout(contains("key pose"));
+    regenerate(&again, "1").assert().success();
+    regenerate(&other, "2").assert().success();
+    let stem = FIXTURE
+        .file(0, "bvh")
+        .file_stem()
+        .unwrap()
+        .to_string_lossy()
+        .into_owned();
+    let dance = |folder: &Path, number: usize| {
+        fs::read(folder.join(format!("{stem}_{number:03}.bvh"))).unwrap()
+    };
+    assert_eq!(dance(&first, 1), dance(&again, 1));
+    assert_ne!(dance(&first, 1), dance(&first, 2));
+    assert_ne!(dance(&first, 1), dance(&other, 1));
+    regenerate(&first, "1")
+        .assert()
+        .failure()
+        .stderr(contains("--force"));
+}
+
+#[test]
+fn the_viewer_plays_the_song_where_it_is_or_holds_it_where_asked() {
+    let folder = TempDir::new().unwrap();
+    let page = |name: &str, more: &[&str]| {
+        let (out, page) = (
+            folder.path().join(format!("{name}.bvh")),
+            folder.path().join(format!("{name}.html")),
+        );
+        let mut command = FIXTURE.generate(&out);
+        command.arg("--keyframe").arg(FIXTURE.key("75@4s"));
+        command.arg("--viewer").arg(&page).args(more);
+        command.assert().success();
+        page_data(&fs::read_to_string(page).unwrap())
+    };
+    let beside = page("beside", &[]);
+    let source = beside["music"]["source"].as_str().unwrap();
+    let song = FIXTURE.file(0, "wav");
+    assert!(
+        source.ends_with(song.file_name().unwrap().to_str().unwrap()),
+        "{source}"
+    );
+    assert!(!source.contains(':'), "{source} is not relative");
+    let beats = beside["music"]["beats"].as_array().unwrap();
+    assert!(beats.len() > 4 && beats.iter().all(|beat| beat.as_u64().unwrap() < 240));
+    assert_eq!(beside["keyframes"][0]["frame"], 120);
+
+    let held = page("held", &["--embed-music"]);
+    let source = held["music"]["source"].as_str().unwrap();
+    assert!(source.starts_with("data:audio/wav;base64,"));
+    let bytes = fs::metadata(&song).unwrap().len();
+    assert!(source.len() as u64 > bytes);
+    let Some(browser) = browser::browser() else {
+        return;
+    };
+    let file = folder.path().join("held.html");
+    let loaded = browser::load(&browser, &file, "#frame=120", 800);
+    assert_eq!(loaded.attribute("data-error"), None, "{}", loaded.log);
+    assert_eq!(
+        loaded.attribute("data-music"),
+        None,
+        "the song cannot be played"
+    );
+    assert!(loaded.console().is_empty(), "{:?}", loaded.console());
 }

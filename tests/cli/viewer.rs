@@ -62,6 +62,7 @@ fn viewer() -> Viewer {
             request.root_trajectory.view(),
             request.velocity_factors.view(),
         )),
+        music: None,
     }
 }
 
@@ -218,6 +219,7 @@ fn positions_come_back_to_half_a_step_however_wide_the_motion() {
             }],
             keyframes: Vec::new(),
             asked: None,
+            music: None,
         };
         let data = page_data(&viewer.html().unwrap());
         let positions = &data["motions"][0]["positions"];

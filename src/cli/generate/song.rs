@@ -1,16 +1,21 @@
 //! `keydance generate --music`: a dance to a song, from a seed and key poses.
 
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use clap::Args;
+use url::Url;
 
 use super::GenerateArgs;
 use crate::cli::notice::warn;
 use crate::motion::bvh;
 use crate::music::Cache;
-use crate::run::{Subject, write_json};
+use crate::report::ViewerMusic;
+use crate::report::viewer::song_page;
+use crate::run::{Subject, replace_file, write_json};
 use crate::synthesis::keyframes::{FileFrom, Time};
 use crate::synthesis::song::{Seed, Song, SongChoice};
 
@@ -31,6 +36,10 @@ pub struct SongArgs {
         conflicts_with = "seed_motion"
     )]
     seed_pose: Option<FileFrom>,
+    /// Put the sound itself into the page of --viewer, which else looks for it where it is now; it
+    /// may not be yours to pass on
+    #[arg(long, requires = "viewer")]
+    embed_music: bool,
     /// End of the dance, where it is shorter than the song: frames, or seconds such as 30s
     #[arg(long, value_name = "TIME", requires = "music")]
     until: Option<Time>,
@@ -53,8 +62,11 @@ pub fn run(args: &GenerateArgs, subject: &Subject, music: &PathBuf) -> anyhow::R
     if choice.motion.is_some() {
         anyhow::bail!("--motion gives no key poses to a song; name each with --keyframe");
     }
-    if args.viewer.is_some() || args.foot_cleanup {
-        anyhow::bail!("--viewer and --foot-cleanup do not go with --music yet; leave them out");
+    if args.foot_cleanup {
+        anyhow::bail!(
+            "--foot-cleanup: {} says of no foot that it stands",
+            subject.what
+        );
     }
     let song = &args.song;
     let seed = match (&song.seed_motion, &song.seed_pose) {
@@ -79,10 +91,76 @@ pub fn run(args: &GenerateArgs, subject: &Subject, music: &PathBuf) -> anyhow::R
     let (dance, summary) = song.dance(model, &name)?;
     let document = song.document(&dance);
     let document = document.context("the motion cannot be written")?;
+    let page = args.viewer.as_ref().map(|page| {
+        let music = ViewerMusic {
+            name: music
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into(),
+            source: match args.song.embed_music {
+                true => embedded(music)?,
+                false => address(music, page)?,
+            },
+            beats: within(&song.music.beats, dance.poses.len()),
+            downbeats: within(&song.music.downbeats, dance.poses.len()),
+        };
+        anyhow::Ok(song_page(
+            &subject.config.name,
+            &song,
+            &dance,
+            &data,
+            music,
+        )?)
+    });
+    let page = page.transpose()?;
     bvh::write(&args.out, &document)?;
+    if let Some((path, page)) = args.viewer.as_ref().zip(page) {
+        replace_file(path, page)?;
+    }
     if let Some(path) = &args.json {
         write_json(path, &summary)?;
     }
     writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())
+}
+
+/// The beats that lie in a dance of so many frames.
+fn within(beats: &[usize], frames: usize) -> Vec<usize> {
+    beats
+        .iter()
+        .copied()
+        .filter(|beat| *beat < frames)
+        .collect()
+}
+
+/// Where a page finds a file: relative to it, so that both may move together.
+fn address(file: &Path, page: &Path) -> anyhow::Result<String> {
+    let absolute = |path: &Path| {
+        let path = std::path::absolute(path).ok()?;
+        Url::from_file_path(path).ok()
+    };
+    let relative = || absolute(page)?.make_relative(&absolute(file)?);
+    relative().with_context(|| format!("{} has no address that a page could name", file.display()))
+}
+
+/// A sound file as a data URL.
+fn embedded(file: &Path) -> anyhow::Result<String> {
+    let content =
+        std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
+    let ending = file
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    let kind = match ending.as_str() {
+        "mp3" => "mpeg",
+        "flac" => "flac",
+        "ogg" => "ogg",
+        _ => "wav",
+    };
+    Ok(format!(
+        "data:audio/{kind};base64,{}",
+        BASE64_STANDARD.encode(content)
+    ))
 }

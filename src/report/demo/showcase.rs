@@ -135,6 +135,7 @@ impl<'d> Showcase<'d> {
             motions: motions.collect(),
             keyframes: keyframes.to_vec(),
             asked: asked.map(|(root, factors)| Asked::new(root.view(), factors.view())),
+            music: None,
         }
         .html()
     }

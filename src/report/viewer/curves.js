@@ -55,6 +55,16 @@ function paintStrips(width, height, ratio) {
     ink.fillRect(x - 0.5, RULER, 1, height - RULER);
     ink.globalAlpha = 1;
   }
+  if (data.music) {
+    const mark = (frame, colour, wide) => {
+      ink.fillStyle = colour;
+      ink.fillRect(timeX(frame, width) - wide / 2, RULER, wide, height - RULER);
+    };
+    ink.globalAlpha = 0.6;
+    for (const beat of data.music.beats) mark(beat, colours.line, 1);
+    for (const beat of data.music.downbeats) mark(beat, colours.muted, 1.5);
+    ink.globalAlpha = 1;
+  }
   const tall = (height - RULER) / data.parts.length;
   data.parts.forEach((_, part) => {
     const [top, bottom] = [RULER + part * tall, RULER + (part + 1) * tall - GAP];

@@ -28,6 +28,7 @@ impl Viewer {
                 request.root_trajectory.view(),
                 request.velocity_factors.view(),
             )),
+            music: None,
         }
     }
 }

@@ -8,6 +8,8 @@
 mod generated;
 mod page;
 mod positions;
+#[cfg(feature = "papers")]
+mod song;
 
 use glam::DVec3;
 use ndarray::{ArrayView1, ArrayView2};
@@ -23,6 +25,8 @@ use positions::Steps;
 
 #[cfg(feature = "papers")]
 pub use generated::generated_page;
+#[cfg(feature = "papers")]
+pub use song::song_page;
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;
@@ -41,6 +45,21 @@ pub struct Viewer {
     pub keyframes: Vec<ViewerKeyframe>,
     /// What the motions were made to follow, if anything.
     pub asked: Option<Asked>,
+    /// What is played in step with them.
+    pub music: Option<ViewerMusic>,
+}
+
+/// The song that motions dance to, from their first frame on.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ViewerMusic {
+    /// Its file's name.
+    pub name: String,
+    /// Where the page finds it: a file's path from the page, or a data URL.
+    pub source: String,
+    /// Frames of its beats, and of those that begin a bar.
+    pub beats: Vec<usize>,
+    pub downbeats: Vec<usize>,
 }
 
 /// What a model was asked for beside the keyframes, one row a frame.
@@ -139,6 +158,7 @@ impl Viewer {
             keyframes: self.keyframes.iter().map(PageKeyframe::new).collect(),
             trajectory: asked.root_trajectory.iter().map(place).collect(),
             asked: rounded_rows(&asked.velocity_factors),
+            music: self.music.as_ref(),
         };
         Ok(page::page(&self.title, &data))
     }
@@ -236,6 +256,7 @@ struct PageData<'v> {
     keyframes: Vec<PageKeyframe>,
     trajectory: Vec<[f64; 3]>,
     asked: Vec<[f64; PARTS]>,
+    music: Option<&'v ViewerMusic>,
 }
 
 #[derive(Serialize)]

@@ -7,11 +7,12 @@ use crate::report::svg::escape;
 const TEMPLATE: &str = include_str!("viewer.html");
 const STYLE: &str = include_str!("viewer.css");
 /// In the order of their dependence.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 6] = [
     include_str!("data.js"),
     include_str!("camera.js"),
     include_str!("scene.js"),
     include_str!("curves.js"),
+    include_str!("music.js"),
     include_str!("player.js"),
 ];
 

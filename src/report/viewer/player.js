@@ -21,8 +21,10 @@ function refresh() {
 function tick(now) {
   scheduled = false;
   if (time.playing) {
+    const heard = heardFrame();
+    if (heard !== null && heard < LAST) time.frame = heard;
     // A frame may have been begun before the play key was heard.
-    advance(Math.min(Math.max(now - time.shownAt, 0), 200));
+    else advance(Math.min(Math.max(now - time.shownAt, 0), 200));
     time.shownAt = now;
     refresh();
   }
@@ -34,7 +36,10 @@ function tick(now) {
 function advance(elapsed) {
   if (time.frame >= LAST) {
     time.held += elapsed;
-    if (time.held > HOLD) [time.frame, time.held] = [0, 0];
+    if (time.held > HOLD) {
+      [time.frame, time.held] = [0, 0];
+      playSong(true, 0, time.speed);
+    }
   } else {
     time.frame = Math.min(time.frame + (elapsed / 1000 / data.frameTime) * time.speed, LAST);
   }
@@ -56,6 +61,7 @@ function play(playing) {
   time.playing = playing && LAST > 0;
   time.shownAt = performance.now();
   if (playing && time.frame >= LAST) time.frame = 0;
+  playSong(time.playing, time.frame, time.speed);
   element("play").setAttribute("aria-label", playing ? "Pause" : "Play");
   refresh();
 }
@@ -74,6 +80,7 @@ function stepTo(frame) {
 function setSpeed(speed) {
   time.speed = speed;
   element("speed").value = String(speed);
+  if (time.playing) playSong(true, time.frame, speed);
 }
 
 function nextKeyframe(direction) {
@@ -285,7 +292,8 @@ function begin() {
 
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   if (wanted.has("frame")) goTo(Number(wanted.get("frame")) || 0);
-  else play(!still);
+  // Browsers play no sound before a click.
+  else play(!still && !song);
   refresh();
 }
 
