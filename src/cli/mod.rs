@@ -65,8 +65,6 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     #[command(after_help = include_str!("help/generate.txt"))]
     Generate(Box<generate::GenerateArgs>),
-    #[command(after_help = include_str!("help/regenerate.txt"))]
-    Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/reproduce.txt"))]
     Reproduce(reproduce::ReproduceArgs),
     /// Set scores beside the paper's in its tables 2 to 4
@@ -74,6 +72,8 @@ enum Command {
     Tables(tables::TablesArgs),
     #[command(after_help = include_str!("help/figures.txt"))]
     Figures(figures::FiguresArgs),
+    #[command(after_help = include_str!("help/regenerate.txt"))]
+    Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/runs.txt"))]
     Runs(runs::RunsArgs),
     /// Look into BVH files
