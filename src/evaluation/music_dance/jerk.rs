@@ -14,7 +14,9 @@ pub fn mean_jerk(world: &[Vec<DVec3>]) -> f64 {
     for frames in world.windows(4) {
         let [a, b, c, d] = frames else { continue };
         for (((a, b), c), d) in a.iter().zip(b).zip(c).zip(d) {
-            sum += (*d - 3.0 * *c + 3.0 * *b - *a).length();
+            // By steps, so that what stands still has exactly none.
+            let [first, second, third] = [*b - *a, *c - *b, *d - *c];
+            sum += ((third - second) - (second - first)).length();
             count += 1;
         }
     }
