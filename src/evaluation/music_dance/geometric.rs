@@ -7,7 +7,7 @@ use super::relations::{COUNT, Length, Place, RELATIONS, Relation};
 use crate::motion::contact_foot::joint_called;
 use crate::motion::{MissingJoint, Skeleton};
 
-/// The [relations](RELATIONS) on a skeleton.
+/// The 32 relations on a skeleton.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricFeatures {
     relations: Vec<OnSkeleton>,
@@ -209,9 +209,9 @@ mod tests {
         (0..COUNT).filter(|index| shares[*index] == 1.0).collect()
     }
 
-    /// What holds at rest: hands 160 apart, more than 2.5 x 40; the left ankle 14.7 in front of the
-    /// plane through root, right hip and right toes, more than 0.38 x 30; arms at right angles to the
-    /// trunk.
+    /// What holds at rest: hands 160 apart, more than 2.5 x 40; the left ankle 14.7 in front of
+    /// the plane through root, right hip and right toes, more than 0.38 x 30; arms at right angles
+    /// to the trunk.
     const AT_REST: [usize; 4] = [8, 15, 23, 24];
 
     #[test]
