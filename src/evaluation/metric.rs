@@ -21,6 +21,8 @@ pub struct Metric {
 pub enum Better {
     Lower,
     Higher,
+    /// It is a yardstick for others, or has one of its own.
+    Neither,
 }
 
 impl Better {
@@ -29,6 +31,7 @@ impl Better {
         match self {
             Self::Lower => "lower is better",
             Self::Higher => "higher is better",
+            Self::Neither => "neither end is better",
         }
     }
 }

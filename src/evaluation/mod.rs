@@ -6,6 +6,8 @@ pub mod equations;
 #[cfg(feature = "papers")]
 pub mod in_betweening;
 mod metric;
+#[cfg(feature = "papers")]
+pub mod music_dance;
 mod printed;
 pub mod protocol;
 mod protocol_table;

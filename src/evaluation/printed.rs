@@ -12,10 +12,13 @@ use toml::Table;
 pub struct PrintedTables {
     /// The paper, such as "Pan et al. 2021".
     pub title: String,
+    /// What is to be known of its numbers, a sentence for every caption.
+    #[serde(default)]
+    pub note: Option<String>,
     /// The protocol that its numbers were counted by; none: the model's only one.
     #[serde(default)]
     pub protocol: Option<String>,
-    /// Columns of all tables, as scores name them.
+    /// Columns of all tables that name none of their own, as scores name them.
     #[serde(default)]
     pub columns: Vec<String>,
     /// One table a metric, in the order in which they are shown.
@@ -40,6 +43,12 @@ pub struct PrintedTable {
     pub number: Option<u32>,
     /// Key of the metric.
     pub metric: String,
+    /// Columns of the metric, said by its first table; left out: those of all tables.
+    #[serde(default)]
+    pub columns: Option<Vec<String>>,
+    /// Names of the rows that it has; left out: all.
+    #[serde(default)]
+    pub rows: Option<Vec<String>>,
 }
 
 /// A row of a paper's tables.
@@ -89,7 +98,7 @@ impl PrintedTables {
     /// Reads the text of a `paper.toml`; `origin` is what errors call it.
     ///
     /// # Errors
-    /// It is not TOML of this form, or a row has more or fewer values than there are columns.
+    /// It is not TOML of this form, or a row has more or fewer values than its table has columns.
     pub fn parse(text: &str, origin: &str) -> Result<Self, PrintedError> {
         let bad = |problem: String| PrintedError {
             origin: origin.into(),
@@ -99,7 +108,8 @@ impl PrintedTables {
             toml::from_str(text).map_err(|cause| bad(cause.to_string().trim_end().into()))?;
         for row in &printed.rows {
             for (metric, values) in &row.values {
-                let (name, found, columns) = (&row.name, values.len(), printed.columns.len());
+                let columns = printed.columns_of(metric).len();
+                let (name, found) = (&row.name, values.len());
                 if found != columns {
                     return Err(bad(format!(
                         "rows.{name}.{metric} has {found} values for {columns} columns"
@@ -113,6 +123,14 @@ impl PrintedTables {
     /// Whether its numbers stand beside scores by this protocol.
     pub fn compares(&self, protocol: &str) -> bool {
         self.protocol.as_deref().is_none_or(|own| own == protocol)
+    }
+
+    /// The columns of a metric's values.
+    pub fn columns_of(&self, metric: &str) -> &[String] {
+        let mut tables = self.tables.iter();
+        let own = tables.find(|table| table.metric == metric);
+        let own = own.and_then(|table| table.columns.as_ref());
+        own.unwrap_or(&self.columns)
     }
 
     /// The row of a config's name.

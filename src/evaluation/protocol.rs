@@ -23,6 +23,11 @@ pub trait Protocol: Send + Sync {
         &[]
     }
 
+    /// What the number of a column counts, as tables call it.
+    fn number(&self) -> &'static str {
+        "N"
+    }
+
     /// Frames of all requests that a model will be asked on recordings of these numbers of frames:
     /// how far an evaluation has to go.
     fn frames(&self, recordings: &[usize]) -> u64;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::scores::{AVERAGE, ScoreRow, Scores};
-use super::{Metric, PrintedRow, PrintedTables, Protocol, TableRow};
+use super::{Metric, PrintedRow, PrintedTable, PrintedTables, Protocol, TableRow};
 
 /// The cell of a model that has no scores yet.
 const ABSENT: &str = "—";
@@ -15,7 +15,6 @@ pub(super) struct ProtocolTable<'a> {
     printed: &'a PrintedTables,
     /// All but those that were scored by other protocols only.
     rows: Vec<&'a TableRow>,
-    columns: Vec<String>,
 }
 
 impl<'a> ProtocolTable<'a> {
@@ -28,14 +27,11 @@ impl<'a> ProtocolTable<'a> {
             Some(scores) => scores.by(protocol.name()).is_some(),
             None => true,
         };
-        let mut table = Self {
+        Self {
             protocol,
             printed,
             rows: rows.iter().filter(by_it).collect(),
-            columns: Vec::new(),
-        };
-        table.columns = table.columns();
-        table
+        }
     }
 
     /// Whether it is the one that the paper's numbers stand in.
@@ -59,7 +55,7 @@ impl<'a> ProtocolTable<'a> {
 
     pub(super) fn markdown(&self, subject: &str) -> String {
         let tables = self.tables().into_iter();
-        let text = |(number, metric)| self.markdown_table(number, metric, subject);
+        let text = |(table, metric)| self.markdown_table(table, metric, subject);
         tables.map(text).collect::<Vec<String>>().join("\n")
     }
 
@@ -67,23 +63,28 @@ impl<'a> ProtocolTable<'a> {
         row.scores.as_ref()?.by(self.protocol.name())
     }
 
-    /// The metrics that have a table, with its number in the paper: all where the paper prints
+    /// The metrics that have a table, with what the paper's file says of it: all where that prints
     /// none.
-    fn tables(&self) -> Vec<(Option<u32>, &Metric)> {
+    fn tables(&self) -> Vec<(Option<&PrintedTable>, &Metric)> {
         let metrics = self.protocol.metrics();
         if self.printed.tables.is_empty() || !self.is_compared() {
             return metrics.iter().map(|metric| (None, metric)).collect();
         }
         let tables = self.printed.tables.iter().filter_map(|table| {
             let of_table = |metric: &&Metric| metric.key == table.metric;
-            Some((table.number, metrics.iter().find(of_table)?))
+            Some((Some(table), metrics.iter().find(of_table)?))
         });
         tables.collect()
     }
 
-    fn markdown_table(&self, number: Option<u32>, metric: &Metric, subject: &str) -> String {
-        let (columns, title) = (&self.columns, metric.title);
-        let mut out = match number {
+    fn markdown_table(
+        &self,
+        table: Option<&PrintedTable>,
+        metric: &Metric,
+        subject: &str,
+    ) -> String {
+        let (columns, title) = (&self.columns(metric), metric.title);
+        let mut out = match table.and_then(|table| table.number) {
             Some(number) => format!("## Table {number}: {title}\n\n"),
             None if self.is_compared() => format!("## {title}\n\n"),
             None => format!("## {title} by `{}`\n\n", self.protocol.name()),
@@ -91,12 +92,20 @@ impl<'a> ProtocolTable<'a> {
         let mut add = |title: &str, kind: &str, cells: &[String]| {
             out += &format!("| {title} | {kind} | {} |\n", cells.join(" | "));
         };
-        let titles: Vec<String> = columns.iter().map(|it| column_title(it, "N = ")).collect();
+        let of_number = format!("{} = ", self.protocol.number());
+        let titles: Vec<String> = columns
+            .iter()
+            .map(|it| column_title(it, &of_number))
+            .collect();
         add("Model", "", &titles);
         add("---", "---", &vec!["---:".into(); columns.len()]);
-        for group in groups(self.printed, self.rows.iter().copied()) {
+        let mut groups = groups(self.printed, self.rows.iter().copied());
+        if let Some(rows) = table.and_then(|table| table.rows.as_ref()) {
+            groups.retain(|group| group.names().any(|name| rows.iter().any(|row| row == name)));
+        }
+        for group in groups {
             let mut title = group.title.as_str();
-            for (kind, cells) in self.group_lines(&group, metric) {
+            for (kind, cells) in self.group_lines(&group, metric, columns) {
                 add(std::mem::take(&mut title), &kind, &cells);
             }
         }
@@ -107,16 +116,23 @@ impl<'a> ProtocolTable<'a> {
         }
         if self.is_compared() {
             out += "The difference is ours minus the paper's. ";
+            if let Some(note) = &self.printed.note {
+                out += &format!("{note} ");
+            }
         }
         out + &format!("Ours on {subject}.\n")
     }
 
     /// The lines of one model: what each shows, and its cells.
-    fn group_lines(&self, group: &Group<'_>, metric: &Metric) -> Vec<(String, Vec<String>)> {
-        let columns = &self.columns;
+    fn group_lines(
+        &self,
+        group: &Group<'_>,
+        metric: &Metric,
+        columns: &[String],
+    ) -> Vec<(String, Vec<String>)> {
+        let known = self.printed.columns_of(metric.key);
         let prints = |row: &&PrintedRow| self.is_compared() && row.values.contains_key(metric.key);
         let paper = group.paper.filter(prints).map(|row| -> Vec<Option<f64>> {
-            let known = &self.printed.columns;
             let value = |column: &String| row.value(metric.key, known, column);
             columns.iter().map(value).collect()
         });
@@ -130,7 +146,7 @@ impl<'a> ProtocolTable<'a> {
         };
         let compared = |ours: &[Option<f64>], of: &TableRow| {
             let row = self.scores(of).and_then(|scores| scores.row(metric.key));
-            let same = row.is_some_and(|row| row.columns().eq(&self.printed.columns));
+            let same = row.is_some_and(|row| row.columns().eq(known));
             // A mean is compared only if it is over the same columns.
             let values = ours.iter().zip(paper.as_ref()?).zip(columns);
             let differences = values.map(|((ours, paper), column)| {
@@ -187,7 +203,7 @@ impl<'a> ProtocolTable<'a> {
     }
 
     pub(super) fn terminal(&self) -> String {
-        let columns = &self.columns;
+        let all = self.all_columns();
         let metrics = self.protocol.metrics();
         let titles = metrics.iter().map(block_title);
         let names = self.rows.iter().map(|row| row.name.clone());
@@ -197,23 +213,27 @@ impl<'a> ProtocolTable<'a> {
             let cells: String = cells.iter().map(|cell| format!("{cell:>9}")).collect();
             format!("{name:<width$}{cells}\n")
         };
-        let header: Vec<String> = columns.iter().map(|it| column_title(it, "")).collect();
+        let header = |columns: &[String]| -> Vec<String> {
+            columns.iter().map(|it| column_title(it, "")).collect()
+        };
         let measured = self.rows.iter();
         let measured = measured.filter_map(|row| Some((*row, self.scores(row)?)));
         let measured: Vec<(&TableRow, &Scores)> = measured.collect();
-        let mut out = String::new();
+        let (mut out, mut same_columns) = (String::new(), true);
         for metric in metrics {
             let mut rows = measured.iter().map(|(_, scores)| scores.row(metric.key));
             if rows.all(|row| row.is_none()) {
                 continue;
             }
-            out += &line(&block_title(metric), &header);
+            let columns = &self.columns(metric);
+            same_columns &= *columns == all;
+            out += &line(&block_title(metric), &header(columns));
             for (row, scores) in &measured {
                 let ours = our_values(scores.row(metric.key), columns);
                 out += &line(&row.name, &cells(&ours, metric));
                 let paper = self.printed.row(&row.name).filter(|_| self.is_compared());
                 let paper = paper.filter(|paper| paper.values.contains_key(metric.key));
-                let known = &self.printed.columns;
+                let known = self.printed.columns_of(metric.key);
                 // A mean over other lengths is not the paper's.
                 let all = known.iter().all(|column| columns.contains(column));
                 if let Some(paper) = paper.filter(|_| all) {
@@ -227,8 +247,11 @@ impl<'a> ProtocolTable<'a> {
             }
             out.push('\n');
         }
+        if !same_columns {
+            out += &line("", &header(&all));
+        }
         for (row, scores) in &measured {
-            let counted = columns.iter().filter(|column| *column != AVERAGE);
+            let counted = all.iter().filter(|column| *column != AVERAGE);
             let counts = counted.map(|column| scores.windows_of(column));
             let counts = counts.map(|count| count.map_or("-".into(), |count| count.to_string()));
             let name = format!("windows, {}", row.name);
@@ -237,26 +260,46 @@ impl<'a> ProtocolTable<'a> {
         out
     }
 
-    /// The columns of the rows, numbers first and ascending, the mean last; the paper's where there
-    /// are no rows.
-    fn columns(&self) -> Vec<String> {
+    /// The columns of a metric: those of its scores, all where it has none.
+    fn columns(&self, metric: &Metric) -> Vec<String> {
+        let rows = self.rows.iter().filter_map(|row| self.scores(row));
+        let rows = rows.filter_map(|scores| scores.row(metric.key));
+        let columns = ordered(rows.flat_map(ScoreRow::columns));
+        match columns.is_empty() {
+            true if self.is_compared() => match self.printed.columns_of(metric.key) {
+                [] => self.all_columns(),
+                printed => printed.to_vec(),
+            },
+            true => self.all_columns(),
+            false => columns,
+        }
+    }
+
+    /// The columns of all rows; the paper's where there are no rows.
+    fn all_columns(&self) -> Vec<String> {
         let scores = self.rows.iter().filter_map(|row| self.scores(row));
         let rows = scores.flat_map(Scores::rows);
-        let mut columns: Vec<String> = Vec::new();
-        for column in rows.flat_map(|(_, row)| row.columns()) {
-            if !columns.iter().any(|known| known == column) {
-                columns.push(column.into());
-            }
+        let columns = ordered(rows.flat_map(|(_, row)| row.columns()));
+        match columns.is_empty() {
+            true => self.printed.columns.clone(),
+            false => columns,
         }
-        if columns.is_empty() {
-            return self.printed.columns.clone();
-        }
-        columns.sort_by_key(|column| {
-            let number = column.parse::<u64>().unwrap_or(u64::MAX);
-            (number, column == AVERAGE)
-        });
-        columns
     }
+}
+
+/// Columns, each once, numbers first and ascending, the mean last.
+fn ordered<'c>(names: impl Iterator<Item = &'c str>) -> Vec<String> {
+    let mut columns: Vec<String> = Vec::new();
+    for column in names {
+        if !columns.iter().any(|known| known == column) {
+            columns.push(column.into());
+        }
+    }
+    columns.sort_by_key(|column| {
+        let number = column.parse::<u64>().unwrap_or(u64::MAX);
+        (number, column == AVERAGE)
+    });
+    columns
 }
 
 /// The models of these rows: those of the paper in its order, then the others.
@@ -337,6 +380,12 @@ pub(super) struct Group<'a> {
 }
 
 impl Group<'_> {
+    /// The names of its configs.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let paper = self.paper.iter().map(|row| row.name.as_str());
+        paper.chain(self.ours.iter().map(|row| row.name.as_str()))
+    }
+
     /// Whether these are trainings of one model on one budget with several seeds.
     fn differ_in_seed_only(&self) -> bool {
         let Some((first, others)) = self.ours.split_first() else {

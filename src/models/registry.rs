@@ -37,6 +37,10 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(RotationBaseline::Slerp),
         #[cfg(feature = "papers")]
         Arc::new(RotationBaseline::HeldPose),
+        #[cfg(feature = "papers")]
+        Arc::new(RotationBaseline::KeyPoseInterpolation),
+        #[cfg(feature = "papers")]
+        Arc::new(RotationBaseline::HeldSeed),
     ]
 }
 

@@ -88,7 +88,7 @@ fn series(
 ) -> Vec<ScoreSeries> {
     let of_paper = |row: &PrintedRow| -> Vec<(f64, f64)> {
         let values = row.values.get(metric.key).into_iter().flatten();
-        let columns = printed.columns.iter().map(String::as_str);
+        let columns = printed.columns_of(metric.key).iter().map(String::as_str);
         numbered(columns.zip(values.copied()))
     };
     let mut series: Vec<ScoreSeries> = Vec::new();

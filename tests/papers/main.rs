@@ -5,6 +5,8 @@
 mod generated_data;
 #[path = "../common/lafan1_data.rs"]
 mod lafan1_data;
+#[path = "../common/music_dance_data.rs"]
+mod music_dance_data;
 #[path = "../common/real_data.rs"]
 mod real_data;
 #[path = "../common/small_run.rs"]
@@ -26,6 +28,7 @@ mod interpolation;
 mod li2023;
 mod mapped_model;
 mod metrics;
+mod music_dance;
 mod pan2021;
 mod preferred;
 mod prior;

@@ -1,10 +1,12 @@
-//! Baselines of rotations on any skeleton: slerp between the keyframes, and the first one held.
+//! Baselines of rotations on any skeleton: slerp between the keyframes, and the first one held; after
+//! a seed slerp between key poses, and the seed's last pose held.
 
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use crate::data::DataConfig;
+use crate::evaluation::music_dance::PU2022;
 use crate::models::generator::{Motion, NeededPoses, Needs, Request};
 use crate::models::li2023;
 use crate::models::settings::{
@@ -24,6 +26,10 @@ pub enum RotationBaseline {
     Slerp,
     /// Pose and root of the first keyframe held: "zero velocity" of the LaFAN1 benchmark.
     HeldPose,
+    /// The same as slerp between all poses that are given after a seed; the last one is held.
+    KeyPoseInterpolation,
+    /// Pose and root of the seed's last frame held, whatever the key poses.
+    HeldSeed,
 }
 
 /// `[model]` with nothing but its kind.
@@ -40,7 +46,12 @@ struct KindOnly {
 }
 
 impl RotationBaseline {
-    const ALL: [(Self, &'static str); 2] = [(Self::Slerp, "slerp"), (Self::HeldPose, "held_pose")];
+    const ALL: [(Self, &'static str); 4] = [
+        (Self::Slerp, "slerp"),
+        (Self::HeldPose, "held_pose"),
+        (Self::KeyPoseInterpolation, "key_pose_interpolation"),
+        (Self::HeldSeed, "held_seed"),
+    ];
 
     fn title(self) -> &'static str {
         let found = Self::ALL.iter().find(|(kind, _)| *kind == self);
@@ -54,7 +65,10 @@ impl ModelKind for RotationBaseline {
     }
 
     fn papers(&self) -> Vec<Paper> {
-        vec![li2023::DANCE, li2023::LAFAN1]
+        match self {
+            Self::Slerp | Self::HeldPose => vec![li2023::DANCE, li2023::LAFAN1],
+            Self::KeyPoseInterpolation | Self::HeldSeed => vec![PU2022],
+        }
     }
 
     fn defaults(&self) -> Table {
@@ -110,26 +124,30 @@ impl RotationBaseline {
         }
     }
 
-    /// Poses of every frame, `[F]`.
+    /// Poses of every frame, `[F]`; none without a given one.
     fn poses(self, request: &Request) -> Vec<Pose> {
-        let keyframes = request.given.iter().filter(|given| given.frame >= 0);
-        let keyframes: Vec<(f64, &Pose)> = keyframes
+        let given = request.given.iter().filter(|given| given.frame >= 0);
+        let given: Vec<(f64, &Pose)> = given
             .map(|given| (given.frame as f64, &given.pose))
             .collect();
-        let frames = 0..request.frames;
-        frames
-            .map(|frame| {
-                let frame = frame as f64;
-                let after = keyframes.partition_point(|(at, _)| *at <= frame);
-                let end = after.clamp(1, keyframes.len() - 1);
-                let ((from, start), (to, target)) = (keyframes[end - 1], keyframes[end]);
-                match self {
-                    Self::Slerp => start.towards(target, (frame - from) / (to - from)),
-                    Self::HeldPose if frame == to => target.clone(),
-                    Self::HeldPose => start.clone(),
+        let seed = given.iter().zip(0..request.frames);
+        let seed = seed.take_while(|((at, _), frame)| *at == *frame as f64);
+        let seed = seed.count();
+        let pose = |frame: usize| {
+            let last_of_seed = given.get(seed.checked_sub(1)?);
+            let at = frame as f64;
+            let next = given.partition_point(|(known, _)| *known <= at);
+            let start = given.get(next.checked_sub(1)?)?;
+            Some(match (self, given.get(next)) {
+                (Self::HeldSeed, _) if frame >= seed => last_of_seed?.1.clone(),
+                (Self::Slerp | Self::KeyPoseInterpolation, Some(target)) => {
+                    let share = (at - start.0) / (target.0 - start.0);
+                    start.1.towards(target.1, share)
                 }
+                _ => start.1.clone(),
             })
-            .collect()
+        };
+        (0..request.frames).filter_map(pose).collect()
     }
 }
 
@@ -140,7 +158,10 @@ impl Generator for RotationBaseline {
 
     fn needs(&self) -> Needs {
         Needs {
-            poses: NeededPoses::Keyframes { past: 0 },
+            poses: match self {
+                Self::Slerp | Self::HeldPose => NeededPoses::Keyframes { past: 0 },
+                Self::KeyPoseInterpolation | Self::HeldSeed => NeededPoses::Seed(1),
+            },
             conditions: &[],
             heeds: &[],
         }

@@ -1,0 +1,12 @@
+//! The paper that the protocol belongs to.
+
+use super::MusicDance;
+use crate::models::settings::Paper;
+
+/// Pu and Shan: music-driven dance regeneration with controllable key pose constraints (2022).
+pub const PU2022: Paper = Paper {
+    name: "pu2022",
+    printed: include_str!("../../../experiments/pu2022/paper.toml"),
+    figures: None,
+    protocols: |_, options| vec![Box::new(MusicDance::new(options))],
+};
