@@ -34,6 +34,9 @@ pub struct Recording {
     pub music: Option<Arc<Analysis>>,
 }
 
+/// Frames of clips by the clip: each range from its first frame up to the one after its last.
+pub type NamedFrames = BTreeMap<String, Vec<Range<usize>>>;
+
 /// A data set, split.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
@@ -45,9 +48,8 @@ pub struct Dataset {
     /// `LC_ALL=C sha256sum *.bvh | sha256sum` prints in the folder; where clips have music, of each
     /// clip and its sound file together. Of clips without files, over names and poses.
     pub digest: String,
-    /// Frames of clips by a name of theirs, such as those of new poses: by clip, each range from
-    /// its first frame up to the one after its last.
-    pub named_frames: BTreeMap<String, BTreeMap<String, Vec<Range<usize>>>>,
+    /// Frames of clips by a name of theirs, such as those of new poses.
+    pub named_frames: BTreeMap<String, NamedFrames>,
     /// What is odd about the files, or was changed in reading them; no error.
     pub warnings: Vec<String>,
 }

@@ -2,13 +2,12 @@
 //! name.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::dataset::DataError;
+use super::dataset::{DataError, NamedFrames};
 use super::split::Parts;
 
 /// Largest file of this kind, bytes.
@@ -74,9 +73,7 @@ pub(super) fn among(parts: Parts, names: &[String], origin: &str) -> Result<Part
 ///
 /// # Errors
 /// The file is there and is none.
-pub(super) fn named_frames(
-    folder: &Path,
-) -> Result<BTreeMap<String, BTreeMap<String, Vec<Range<usize>>>>, DataError> {
+pub(super) fn named_frames(folder: &Path) -> Result<BTreeMap<String, NamedFrames>, DataError> {
     let path = folder.join("novel.json");
     if !path.is_file() {
         return Ok(BTreeMap::new());

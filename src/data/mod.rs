@@ -14,7 +14,7 @@ mod twins;
 mod windows;
 
 pub use config::{DataConfig, Split};
-pub use dataset::{DataError, Dataset, Recording};
+pub use dataset::{DataError, Dataset, NamedFrames, Recording};
 pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};
 pub use part::{DataPart, EmptyPart};

@@ -240,7 +240,7 @@ fn key_frames_are_drawn_apart_and_as_many_as_may_be() {
     let (window, schedule) = (WindowConfig::default(), ScheduleConfig::default());
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut counts = [0; 7];
-    let mut seen = vec![false; 180];
+    let mut seen = [false; 180];
     for _ in 0..3000 {
         let keys = draw_keys(&mut rng, &window, &schedule);
         assert!(keys.iter().all(|key| (60..240).contains(key)));

@@ -56,7 +56,7 @@ impl SongArgs {
 
 /// # Errors
 /// As [`super::run`].
-pub fn run(args: &GenerateArgs, subject: &Subject, music: &PathBuf) -> anyhow::Result<()> {
+pub fn run(args: &GenerateArgs, subject: &Subject, music: &Path) -> anyhow::Result<()> {
     let data = args.units.over(&subject.config.data);
     let choice = args.keyframes.choice(data.fps);
     if choice.motion.is_some() {
@@ -78,7 +78,7 @@ pub fn run(args: &GenerateArgs, subject: &Subject, music: &PathBuf) -> anyhow::R
         ),
     };
     let choice = SongChoice {
-        music: music.clone(),
+        music: music.into(),
         seed,
         key_poses: choice.further,
         frames: song.until.map(|until| until.frame(data.fps)),

@@ -134,15 +134,17 @@ fn drum(sound: &mut [f64], from: usize, strength: f64, rng: &mut ChaCha12Rng) {
 fn chord(sound: &mut [f64], range: std::ops::Range<usize>, root: i32) {
     let end = range.end.min(sound.len());
     let notes = [0, 4, 7].map(|step| MIDDLE_C * 2_f64.powf(f64::from(root + step) / 12.0));
-    for n in range.start..end {
-        let time = (n - range.start) as f64 / RATE as f64;
+    let own = &mut sound[range.start.min(end)..end];
+    let length = own.len();
+    for (n, sample) in own.iter_mut().enumerate() {
+        let time = n as f64 / RATE as f64;
         // Soft at both ends: no click of its own.
-        let left = (end - n) as f64 / RATE as f64;
+        let left = (length - n) as f64 / RATE as f64;
         let level = CHORD * (time / 0.02).min(1.0) * (left / 0.02).min(1.0) * (-time / 2.0).exp();
         let partial = |frequency: f64, k: f64| (TAU * frequency * k * time).sin() / (k * k);
         let tones = notes
             .iter()
             .map(|&f| (1..=3).map(|k| partial(f, f64::from(k))).sum::<f64>());
-        sound[n] += level * tones.sum::<f64>();
+        *sample += level * tones.sum::<f64>();
     }
 }

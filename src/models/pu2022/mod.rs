@@ -32,6 +32,7 @@ pub use window::{WindowFrame, pose_of};
 
 use toml::Table;
 
+use crate::evaluation::music_dance::PU2022;
 use crate::models::settings::{ModelKind, ModelSettings, Paper};
 
 /// The line of the registry.
@@ -44,7 +45,7 @@ impl ModelKind for Pu2022Kind {
     }
 
     fn papers(&self) -> Vec<Paper> {
-        Vec::new()
+        vec![PU2022]
     }
 
     fn defaults(&self) -> Table {
