@@ -2,7 +2,7 @@
 """Compares keydance with a PyTorch version of its model: numbers, gradients and speed.
 
     compare_pytorch.py check --weights W.safetensors --batch B.safetensors
-    compare_pytorch.py time [--model pan2021 | li2023] [--keydance BINARY]
+    compare_pytorch.py time [--model pan2021 | li2023 | pu2022] [--keydance BINARY]
     compare_pytorch.py selftest
 
 Needs the packages of scripts/pytorch_reference/requirements.txt.
@@ -18,10 +18,12 @@ import checks  # noqa: E402
 import li2023_checks  # noqa: E402
 import li2023_timing  # noqa: E402
 import pu2022_checks  # noqa: E402
+import pu2022_timing  # noqa: E402
 import timing  # noqa: E402
 
-SIZES = {"pan2021": ([5, 30, 60], 128), "li2023": ([50], 12)}
-LI2023 = Path(__file__).resolve().parent.parent / "experiments" / "li2023" / "ours.toml"
+SIZES = {"pan2021": ([5, 30, 60], 128), "li2023": ([50], 12), "pu2022": ([240], 20)}
+EXPERIMENTS = Path(__file__).resolve().parent.parent / "experiments"
+CONFIGS = {"li2023": "li2023/ours.toml", "pu2022": "pu2022/larger.toml"}
 
 
 def main():
@@ -41,11 +43,11 @@ def main():
 
     time = commands.add_parser("time", help="training steps and generation, in turn")
     time.add_argument("--model", choices=SIZES, default="pan2021")
-    time.add_argument("--config", type=Path, default=LI2023, help="li2023: of keydance's step")
+    time.add_argument("--config", type=Path, help="li2023, pu2022: of keydance's step")
     time.add_argument("--keydance", type=Path, help="binary to time in turn with PyTorch")
-    time.add_argument("--frames", type=int, nargs="+", help="pan2021: 5 30 60; li2023: 50")
-    time.add_argument("--batch", type=int, help="windows; pan2021: 128, li2023: 12")
-    time.add_argument("--threads", type=int, default=2, help="li2023: and processes")
+    time.add_argument("--frames", type=int, nargs="+", help="pan2021: 5 30 60; li2023: 50; pu2022: 240")
+    time.add_argument("--batch", type=int, help="windows; pan2021: 128, li2023: 12, pu2022: 20")
+    time.add_argument("--threads", type=int, default=2, help="li2023, pu2022: and processes")
     time.add_argument("--rounds", type=int, default=5, help="turns; the best of each counts")
     time.add_argument(
         "--others-up-to",
@@ -64,8 +66,10 @@ def main():
     frames, batch = SIZES[arguments.model]
     arguments.frames = arguments.frames or frames
     arguments.batch = arguments.batch or batch
-    chosen = li2023_timing if arguments.model == "li2023" else timing
-    return chosen.time_all(arguments)
+    if arguments.model in CONFIGS:
+        arguments.config = arguments.config or EXPERIMENTS / CONFIGS[arguments.model]
+    chosen = {"pan2021": timing, "li2023": li2023_timing, "pu2022": pu2022_timing}
+    return chosen[arguments.model].time_all(arguments)
 
 
 def check_kind(weights, batch, tolerance):
