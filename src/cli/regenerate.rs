@@ -54,7 +54,7 @@ pub fn run(args: RegenerateArgs) -> anyhow::Result<()> {
     let settings = settings.with_context(|| {
         let kind = subject.config.model.kind();
         format!(
-            "{} is of kind {kind}, which makes no dances from music and key poses",
+            "{} is of kind {kind}: key poses are drawn as in the training of a model of kind pu2022",
             subject.what
         )
     })?;
@@ -63,6 +63,16 @@ pub fn run(args: RegenerateArgs) -> anyhow::Result<()> {
         let clip = args.clip.display();
         format!("{clip} has no sound file of its name beside it; give --music SONG")
     })?;
+    let own = args.clip.parent().unwrap_or(Path::new("")).join(".");
+    if own
+        .canonicalize()
+        .is_ok_and(|own| args.out.canonicalize().is_ok_and(|out| out == own))
+    {
+        anyhow::bail!(
+            "new dances in {} would stand among the recorded ones; give another folder to --out",
+            args.out.display()
+        );
+    }
     check_output_folder(&args.out, args.force)?;
     let stem = args.clip.file_stem().unwrap_or_default().to_string_lossy();
     let (model, data, cache) = (

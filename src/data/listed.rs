@@ -42,7 +42,17 @@ fn read<T: DeserializeOwned>(path: &Path) -> Result<T, DataError> {
 /// # Errors
 /// The file cannot be read, or lists no such parts.
 pub(super) fn parts(folder: &Path) -> Result<Parts, DataError> {
-    let listed: Listed = read(&folder.join("split.json"))?;
+    let path = folder.join("split.json");
+    if !path.is_file() {
+        return Err(DataError::Split {
+            config: "split = \"music_dance\"".into(),
+            origin: format!("the data folder {}", folder.display()),
+            found: "has no split.json; give the folder that holds motion and audio, or for other \
+                    data set data.split = { share = 0.8 }"
+                .into(),
+        });
+    }
+    let listed: Listed = read(&path)?;
     let files = |names: Vec<String>| names.iter().map(|name| format!("{name}.bvh")).collect();
     Ok(Parts {
         train: files(listed.train),

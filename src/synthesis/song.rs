@@ -137,6 +137,13 @@ impl Song {
         let music = heard.analysis;
         let frames = music.frames().min(choice.frames.unwrap_or(usize::MAX));
         let song = || choice.music.clone();
+        if !music.has_onsets() {
+            notices.push(format!("no beat is heard in {}", choice.music.display()));
+        }
+        if let Some(wanted) = choice.frames.filter(|wanted| *wanted > music.frames()) {
+            let (song, end) = (choice.music.display(), music.frames());
+            notices.push(format!("{song} ends at frame {end}, before frame {wanted}"));
+        }
         if frames <= needed {
             return Err(SongError::Short {
                 song: song(),

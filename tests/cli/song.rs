@@ -120,8 +120,10 @@ fn one_pose_may_be_held_and_the_dance_may_end_before_the_song() {
     command.arg("--music").arg(FIXTURE.file(2, "wav"));
     command.arg("--seed-pose").arg(FIXTURE.key("50"));
     command.args(["--until", "3.5s"]).arg("--out").arg(&out);
+    command.args(["--contacts", "left:0-10"]);
     let output = command.assert().success();
-    output.stdout(contains("seed: one pose held for 20 frames"));
+    let output = output.stdout(contains("seed: one pose held for 20 frames"));
+    output.stderr(contains("does not read contacts: left out"));
     let dance = bvh::read(&out).unwrap().to_clip();
     assert_eq!(dance.poses.len(), 105);
     assert_eq!(dance.poses[0].rotations, dance.poses[19].rotations);

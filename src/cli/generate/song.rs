@@ -11,6 +11,7 @@ use url::Url;
 
 use super::GenerateArgs;
 use crate::cli::notice::warn;
+use crate::models::generator::Condition;
 use crate::motion::bvh;
 use crate::music::Cache;
 use crate::report::ViewerMusic;
@@ -86,6 +87,13 @@ pub fn run(args: &GenerateArgs, subject: &Subject, music: &Path) -> anyhow::Resu
     };
     let model = subject.model.as_ref();
     let song = Song::read(&choice, model, &data, &Cache::of_user())?;
+    let needs = model.needs();
+    let contacts = args.contacts.contacts.as_ref();
+    let contacts = contacts.map(|_| Condition::Contacts);
+    let asked = [args.trajectory.asked(), args.velocity.asked(), contacts];
+    let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
+    let unread = unread.map(|it| format!("the model does not read {}: left out", it.title()));
+    warn(unread.collect::<Vec<String>>());
     warn(&song.notices);
     let name = args.out.file_name().unwrap_or_default().to_string_lossy();
     let (dance, summary) = song.dance(model, &name)?;
@@ -148,16 +156,11 @@ fn address(file: &Path, page: &Path) -> anyhow::Result<String> {
 fn embedded(file: &Path) -> anyhow::Result<String> {
     let content =
         std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
-    let ending = file
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    let kind = match ending.as_str() {
-        "mp3" => "mpeg",
-        "flac" => "flac",
-        "ogg" => "ogg",
-        _ => "wav",
+    let kind = match content.get(..4) {
+        Some(b"RIFF") => "wav",
+        Some(b"fLaC") => "flac",
+        Some(b"OggS") => "ogg",
+        _ => "mpeg",
     };
     Ok(format!(
         "data:audio/{kind};base64,{}",

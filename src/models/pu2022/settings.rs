@@ -67,7 +67,11 @@ impl Pu2022Settings {
             let music = Array2::from_shape_simple_fn((self.window.length, numbers), || {
                 rng.random_range(-1.0..1.0)
             });
-            let keys = draw_keys(&mut rng, &self.window, &self.schedule);
+            // With key poses, where there may be any: what reads them is to be seen.
+            let mut keys = draw_keys(&mut rng, &self.window, &self.schedule);
+            while keys.is_empty() && self.schedule.key_poses > 0 {
+                keys = draw_keys(&mut rng, &self.window, &self.schedule);
+            }
             let clip = TrainingClip::new(dance.clip, music, false)?;
             Ok(clip.window(0, &keys, false, &self.window))
         });
@@ -194,10 +198,16 @@ impl ModelSettings for Pu2022Settings {
         &self,
         options: &GradientCheckOptions,
     ) -> Result<Vec<(String, CheckReport)>, ModelError> {
-        let settings = match options.full_size {
+        let mut settings = match options.full_size {
             true => self.clone(),
             false => self.small(),
         };
+        if let Some(frames) = options.frames {
+            settings.window.length = frames;
+            settings
+                .check_values()
+                .map_err(|error| ModelError::data(&error))?;
+        }
         let case = |masks: bool| {
             let title = format!(
                 "T = {}, dropout {}",
