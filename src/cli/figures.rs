@@ -34,7 +34,8 @@ pub struct FiguresArgs {
     /// Folder for the figures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A run to set beside: in figures 11 and 12 of Pan et al., 3 to 6 of Li et al.; may be repeated
+    /// A run to set beside: in figures 11 and 12 of Pan et al., 3 to 6 of Li et al.; may be
+    /// repeated
     #[arg(long, value_name = "RUN_DIR_OR_CONFIG")]
     compare: Vec<PathBuf>,
     /// Test clip to show, by its file name [default: the first by name]

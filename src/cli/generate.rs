@@ -63,8 +63,8 @@ pub struct GenerateArgs {
     #[arg(long)]
     foot_cleanup: bool,
     /// Show the motion beside interpolation and, where keyframes come from --motion at their own
-    /// distances, the recorded motion; of a dance to --music the dance alone, in step with the song:
-    /// one HTML page that needs no network
+    /// distances, the recorded motion; of a dance to --music the dance alone, in step with the
+    /// song: one HTML page that needs no network
     #[arg(long, value_name = "OUT.html")]
     viewer: Option<PathBuf>,
     /// Write what is printed here, too, as JSON

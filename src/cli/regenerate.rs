@@ -28,7 +28,8 @@ pub struct RegenerateArgs {
     /// BVH file of the recorded dance
     #[arg(value_name = "CLIP")]
     clip: PathBuf,
-    /// Its music [default: the sound file of its name beside it, or in the folder audio beside its own]
+    /// Its music [default: the sound file of its name beside it, or in the folder audio beside its
+    /// own]
     #[arg(long, value_name = "SONG")]
     music: Option<PathBuf>,
     /// How many dances

@@ -141,8 +141,8 @@ fn seen(place: DVec3) -> ([f64; 2], f64) {
 /// Radius of the head, pixels.
 const HEAD: f64 = 8.0;
 
-/// Width of the bone that ends at a joint of this name, pixels: the spine is thicker than the limbs,
-/// the ends of limbs thinner.
+/// Width of the bone that ends at a joint of this name, pixels: the spine is thicker than the
+/// limbs, the ends of limbs thinner.
 fn bone_width(joint: &str) -> f64 {
     match joint {
         _ if joint.starts_with("Spine") => 7.6,

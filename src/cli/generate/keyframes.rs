@@ -18,8 +18,8 @@ pub struct KeyframeArgs {
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion",
         value_parser = within(0..=usize::MAX))]
     keyframes: Vec<usize>,
-    /// A frame of any file as a keyframe, and its time in the result, a frame such as jump.bvh:75@60
-    /// or seconds such as jump.bvh:75@12.5s; may be repeated
+    /// A frame of any file as a keyframe, and its time in the result, a frame such as
+    /// jump.bvh:75@60 or seconds such as jump.bvh:75@12.5s; may be repeated
     #[arg(long, value_name = "FILE.bvh:FRAME@TIME")]
     keyframe: Vec<TimedFrame>,
     /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's]

@@ -1,5 +1,5 @@
-//! Baselines of rotations on any skeleton: slerp between the keyframes, and the first one held; after
-//! a seed slerp between key poses, and the seed's last pose held.
+//! Baselines of rotations on any skeleton: slerp between the keyframes, and the first one held;
+//! after a seed slerp between key poses, and the seed's last pose held.
 
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! Windows in the frame of keyframe k1, its root at the origin, as the recurrent network reads them:
-//! there all are alike wherever the dancer is and looks.
+//! Windows in the frame of keyframe k1, its root at the origin, as the recurrent network reads
+//! them: there all are alike wherever the dancer is and looks.
 
 /// What is given of windows of one length.
 #[derive(Debug, Clone)]

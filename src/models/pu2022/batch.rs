@@ -32,7 +32,8 @@ pub struct Batch<T> {
     pub key_poses: Array2<T>,
     /// 1 where there is a key pose, `[W T, 1]`.
     pub is_key: Array2<T>,
-    /// Frames to the nearest known one before and after, `[W T][2]`; the second none after the last.
+    /// Frames to the nearest known one before and after, `[W T][2]`; the second none after the
+    /// last.
     pub known: Vec<(usize, Option<usize>)>,
     /// w_t of the frames that are generated, `[W (T - T'), 1]`.
     pub weights: Array2<T>,

@@ -10,8 +10,8 @@ use crate::motion::{Pose, Skeleton};
 /// terms of the loss weigh as its authors' did.
 const METRE: f64 = 100.0;
 
-/// The frame of reference of a window (spec, section 3): the body at the seed's last frame faces +Z,
-/// its root's x and z are 0.
+/// The frame of reference of a window (spec, section 3): the body at the seed's last frame faces
+/// +Z, its root's x and z are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindowFrame {
     /// From the world's orientation to the window's.

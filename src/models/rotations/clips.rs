@@ -61,8 +61,8 @@ impl TrainingClip {
         })
     }
 
-    /// The `frames` frames from `start` on, between the first and the last of them as keyframes, with
-    /// the `past` frames before.
+    /// The `frames` frames from `start` on, between the first and the last of them as keyframes,
+    /// with the `past` frames before.
     ///
     /// # Panics
     /// They are not all in the clip, or fewer than two.
@@ -146,8 +146,8 @@ impl Forms {
         &self.forms[0]
     }
 
-    /// Draws the form in which a window of `frames` frames with `past` frames before it is seen, and
-    /// where it then starts.
+    /// Draws the form in which a window of `frames` frames with `past` frames before it is seen,
+    /// and where it then starts.
     pub fn draw(
         &self,
         window: Window,
