@@ -1,6 +1,6 @@
 //! A model's answer as poses of all frames, and as the numbers that it gave.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use ndarray::ArrayView1;
 
 use super::request::SEED;
@@ -42,7 +42,7 @@ impl Answer {
             .skip(SEED)
             .map(|frame| frame.rows().into_iter().map(vector).collect())
             .collect();
-        let rotations = match motion.poses {
+        let rotations: Vec<Vec<DQuat>> = match motion.poses {
             Some(poses) => poses
                 .into_iter()
                 .skip(SEED)
@@ -50,12 +50,8 @@ impl Answer {
                 .collect(),
             None => {
                 let fit = fit_rotations(&request.skeleton, &world, &like, None);
-                let poses = fit
-                    .map_err(|error| ModelError::data(&error))?
-                    .poses
-                    .into_iter();
-                let rotations: Vec<_> = poses.map(|pose| pose.rotations).collect();
-                rotations
+                let fit = fit.map_err(|error| ModelError::data(&error))?;
+                fit.poses.into_iter().map(|pose| pose.rotations).collect()
             }
         };
         for (rotations, world) in rotations.into_iter().zip(&world) {
