@@ -83,3 +83,27 @@ pub fn dropped_into<T: Real>(dropout: Option<(u64, f64)>, x: &[T], out: &mut [T]
         None => out.copy_from_slice(x),
     }
 }
+
+/// Dropout of a part of its elements where they are, those from `first` on; none changes nothing.
+///
+/// # Panics
+/// When the part reaches beyond 2^32 elements.
+#[track_caller]
+pub fn drop_in_place<T: Real>(dropout: Option<(u64, f64)>, first: usize, x: &mut [T]) {
+    let Some((key, p)) = dropout else { return };
+    assert!(
+        (first + x.len()) as u64 <= 1 << 32,
+        "a dropout mask has at most 2^32 elements"
+    );
+    let mask = Dropout::new(key, p);
+    let scale = T::from_f64(mask.scale);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (i, x) in x.iter_mut().enumerate() {
+                let kept = mask.keep((first + i) as u32);
+                *x *= if kept { scale } else { T::zero() };
+            }
+        },
+    );
+}

@@ -29,7 +29,7 @@ mod windows;
 #[cfg(test)]
 mod tests;
 
-pub use dropout::{dropout_into, dropped_into};
+pub use dropout::{drop_in_place, dropout_into, dropped_into};
 pub use isa::{Isa, IsaError, vectorised};
 pub use matrix::{Mat, MatMut};
 pub use packed::Packed;

@@ -5,7 +5,7 @@
 //! rows are done at once, their sums in registers, so that the sums do not wait for each other.
 //! Rows of scores are padded to a multiple of [`CHUNK`] numbers.
 
-use super::Real;
+use super::{Mat, Real};
 
 /// Numbers in a padded chunk of a row of scores.
 pub const CHUNK: usize = 8;
@@ -30,6 +30,11 @@ impl<'v, T> WindowRows<'v, T> {
     fn row(&self, row: usize, width: usize) -> &'v [T] {
         let from = self.start + row * self.stride;
         &self.values[from..from + width]
+    }
+
+    /// So many rows and columns, as a general product reads them.
+    pub fn matrix(self, rows: usize, width: usize) -> Mat<'v, T> {
+        Mat::strided(&self.values[self.start..], rows, width, self.stride)
     }
 
     /// The rows from `first` on, with columns from `column` on.

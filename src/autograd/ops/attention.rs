@@ -16,9 +16,12 @@
 use super::attention_core::{Sums, scores, softmax_gradient};
 use super::{argument_error, shapes_error};
 use crate::autograd::kernels::{
-    CHUNK, WindowRows, dropout_into, dropped_into, scratch_len, vectorised, window_softmax,
+    CHUNK, WindowRows, drop_in_place, scratch_len, vectorised, window_softmax,
 };
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
+
+/// Numbers of scores, about, that are in the second-level cache from S to Y and back.
+const GROUP: usize = 1 << 15;
 
 /// The columns from `start` of a value `[rows, n]`: Q, K or V, wherever a layer's product put them.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +55,11 @@ impl AttentionShape {
     /// Numbers in the scores of a window and head.
     pub(super) fn block(&self) -> usize {
         self.queries * self.padded_keys()
+    }
+
+    /// Numbers in the scores of the pairs that are done one after the other before the next.
+    fn group(&self) -> usize {
+        (GROUP / self.block()).max(1) * self.block()
     }
 
     pub(super) fn scratch_len(&self) -> usize {
@@ -105,24 +113,34 @@ impl<T: Real> Attention<T> {
         }
     }
 
-    /// Adds B to the scores of every window.
-    fn add_bias(&self, scores: &mut [T], bias: &[T]) {
+    /// Where the rows of a pair begin in B, or in its gradient, of so many numbers.
+    fn bias_of(&self, numbers: usize, pair: usize) -> usize {
+        let block = self.shape.queries * self.shape.keys;
+        pair % (numbers / block) * block
+    }
+
+    /// Adds B to the scores of the pairs from `first` on.
+    fn add_bias(&self, (scores, first): (&mut [T], usize), bias: &[T]) {
         let (keys, padded) = (self.shape.keys, self.shape.padded_keys());
-        let rows = bias.chunks_exact(keys).cycle();
-        for (scores, bias) in scores.chunks_exact_mut(padded).zip(rows) {
-            scores.iter_mut().zip(bias).for_each(|(s, &b)| *s += b);
+        for (pair, scores) in (first..).zip(scores.chunks_exact_mut(self.shape.block())) {
+            let rows = bias[self.bias_of(bias.len(), pair)..].chunks_exact(keys);
+            for (scores, bias) in scores.chunks_exact_mut(padded).zip(rows) {
+                scores.iter_mut().zip(bias).for_each(|(s, &b)| *s += b);
+            }
         }
     }
 
-    fn bias_gradient(&self, context: &mut Backward<'_, T>, bias: Var, ds: &[T]) {
+    fn bias_gradient(&self, context: &mut Backward<'_, T>, bias: Var, (ds, first): (&[T], usize)) {
         let (keys, padded) = (self.shape.keys, self.shape.padded_keys());
-        if let Some(target) = context.target(bias) {
-            let dbias = target.so_far();
-            for ds in ds.chunks_exact(dbias.len() / keys * padded) {
-                let rows = dbias.chunks_exact_mut(keys);
-                for (dbias, ds) in rows.zip(ds.chunks_exact(padded)) {
-                    dbias.iter_mut().zip(ds).for_each(|(db, &ds)| *db += ds);
-                }
+        let Some(target) = context.target(bias) else {
+            return;
+        };
+        let dbias = target.so_far();
+        for (pair, ds) in (first..).zip(ds.chunks_exact(self.shape.block())) {
+            let from = self.bias_of(dbias.len(), pair);
+            let rows = dbias[from..].chunks_exact_mut(keys);
+            for (dbias, ds) in rows.zip(ds.chunks_exact(padded)) {
+                dbias.iter_mut().zip(ds).for_each(|(db, &ds)| *db += ds);
             }
         }
     }
@@ -145,7 +163,7 @@ impl<T: Real> Attention<T> {
         let windows = numbers / (shape.queries * shape.width);
         let mut p = tape.take(windows * shape.heads * shape.block());
         let mut dropped = match self.dropout {
-            Some(_) => tape.take(p.len()),
+            Some(_) => tape.take(shape.group().min(p.len())),
             None => Vec::new(),
         };
         let mut scratch = tape.take(shape.scratch_len());
@@ -153,23 +171,34 @@ impl<T: Real> Attention<T> {
         let [q, k, v] = [self.q, self.k, self.v]
             .map(|operand| operand.rows(tape.values(operand.columns.value)));
         let scale = T::from_f64(self.scale);
-        scores(&mut p, (q, k), shape, scale, &mut scratch);
-        if let Some(bias) = self.bias {
-            self.add_bias(&mut p, tape.values(bias));
+        let mut first = 0;
+        for p in p.chunks_mut(shape.group()) {
+            scores((p, first), (q, k), shape, scale, &mut scratch);
+            if let Some(bias) = self.bias {
+                self.add_bias((p, first), tape.values(bias));
+            }
+            vectorised(
+                #[inline(always)]
+                || window_softmax(p, shape.keys),
+            );
+            let weights = match self.dropout {
+                None => p,
+                Some(_) => {
+                    let dropped = &mut dropped[..p.len()];
+                    dropped.copy_from_slice(p);
+                    drop_in_place(self.dropout, first * shape.block(), dropped);
+                    dropped
+                }
+            };
+            let sums = Sums {
+                weights,
+                first,
+                for_keys: false,
+                rows: v,
+            };
+            sums.put(&mut y, (0, shape.width), shape, false, &mut scratch);
+            first += weights.len() / shape.block();
         }
-        vectorised(
-            #[inline(always)]
-            || window_softmax(&mut p, shape.keys),
-        );
-        if let Some((key, rate)) = self.dropout {
-            dropout_into(key, rate, &p, &mut dropped);
-        }
-        let sums = Sums {
-            weights: self.dropout.map_or(&p, |_| &dropped),
-            for_keys: false,
-            rows: v,
-        };
-        sums.put(&mut y, (0, shape.width), shape, false, &mut scratch);
         tape.give(scratch);
         tape.give(dropped);
         if tape.is_recording() {
@@ -193,35 +222,34 @@ impl<T: Real> Operation<T> for Attention<T> {
             stride: shape.width,
         };
         let mut scratch = context.take(shape.scratch_len());
-
-        let mut dropped = context.take(p.len());
-        dropped_into(self.dropout, p, &mut dropped);
-        let sums = Sums {
-            weights: &dropped,
-            for_keys: true,
-            rows: upstream,
-        };
-        self.add(context, self.v, sums, &mut scratch);
-
-        let mut ds = dropped;
         let scale = T::from_f64(self.scale);
-        scores(&mut ds, (upstream, v), shape, T::one(), &mut scratch);
-        match self.bias {
-            None => softmax_gradient(context, &mut ds, self.dropout, p, shape.keys, scale),
-            Some(bias) => {
-                softmax_gradient(context, &mut ds, self.dropout, p, shape.keys, T::one());
-                self.bias_gradient(context, bias, &ds);
-                ds.iter_mut().for_each(|ds| *ds *= scale);
-            }
-        }
-        for (of, for_keys, rows) in [(self.q, false, k), (self.k, true, q)] {
-            let sums = Sums {
-                weights: &ds,
+        let [mut dropped, mut ds] = [(); 2].map(|()| context.take(shape.group().min(p.len())));
+        let mut first = 0;
+        for p in p.chunks(shape.group()) {
+            let (dropped, ds) = (&mut dropped[..p.len()], &mut ds[..p.len()]);
+            dropped.copy_from_slice(p);
+            drop_in_place(self.dropout, first * shape.block(), dropped);
+            let sums = |weights, for_keys, rows| Sums {
+                weights,
+                first,
                 for_keys,
                 rows,
             };
-            self.add(context, of, sums, &mut scratch);
+            self.add(context, self.v, sums(dropped, true, upstream), &mut scratch);
+
+            scores((ds, first), (upstream, v), shape, T::one(), &mut scratch);
+            let softmax_scale = if self.bias.is_some() { T::one() } else { scale };
+            let place = (&mut *ds, first * shape.block());
+            softmax_gradient(place, self.dropout, p, shape.keys, softmax_scale);
+            if let Some(bias) = self.bias {
+                self.bias_gradient(context, bias, (ds, first));
+                ds.iter_mut().for_each(|ds| *ds *= scale);
+            }
+            self.add(context, self.q, sums(ds, false, k), &mut scratch);
+            self.add(context, self.k, sums(ds, true, q), &mut scratch);
+            first += p.len() / shape.block();
         }
+        context.give(dropped);
         context.give(ds);
         context.give(scratch);
     }
@@ -321,9 +349,10 @@ pub(super) mod gradient {
 
     /// Self-attention with Q, K, V in one value, and attention between two values; with and without
     /// dropout; without a bias and with one for all heads or for each; more keys than a padded
-    /// chunk; small scores and large.
+    /// chunk, and so many that products are general ones; small scores and large.
     pub fn cases() -> Cases {
-        let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, 1usize..11);
+        let keys = prop_oneof![4 => 1usize..11, 1 => 63usize..67];
+        let sizes = (0usize..3, 1usize..3, 1usize..3, 1usize..4, keys);
         let biases = prop_oneof![Just(None), Just(Some(1)), Just(Some(2))];
         let inputs = (sizes, biases, any::<bool>(), strength());
         drawn(inputs, |(sizes, biases, dropout, strength), seed| {

@@ -139,7 +139,7 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
         let mut scratch = context.take(shape.scratch_len());
         let mut ds = context.take(batch * heads * padded);
         let pair = (sizes.rows(&dz), rows);
-        scores(&mut ds, pair, shape, T::one(), &mut scratch);
+        scores((&mut ds, 0), pair, shape, T::one(), &mut scratch);
         vectorised(
             #[inline(always)]
             || {
@@ -152,10 +152,11 @@ impl<T: Real> Operation<T> for QueryAttention<T> {
             },
         );
         let scale = sizes.scale();
-        softmax_gradient(context, &mut ds, self.dropout, &self.p, tokens, scale);
+        softmax_gradient((&mut ds, 0), self.dropout, &self.p, tokens, scale);
         let mut du = context.take(batch * heads * width);
         let sums = |weights, for_keys, rows| Sums {
             weights,
+            first: 0,
             for_keys,
             rows,
         };
@@ -231,7 +232,13 @@ impl<T: Real> Tape<'_, T> {
             known.product(q_h, weight, u.columns(sizes.tokens_of_head(h)), false);
         }
         let pair = (sizes.rows(&u), rows);
-        scores(&mut attention, pair, shape, sizes.scale(), &mut scratch);
+        scores(
+            (&mut attention, 0),
+            pair,
+            shape,
+            sizes.scale(),
+            &mut scratch,
+        );
         vectorised(
             #[inline(always)]
             || window_softmax(&mut attention, tokens),
@@ -239,6 +246,7 @@ impl<T: Real> Tape<'_, T> {
         dropped_into(dropout, &attention, &mut m);
         let sums = Sums {
             weights: &m,
+            first: 0,
             for_keys: false,
             rows,
         };
