@@ -7,7 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 
-use crate::data::choreography::{ChoreographyConfig, GeneratedClip, clips, generate_with_music};
+use super::list::within;
+use crate::data::choreography::{
+    CLIPS, ChoreographyConfig, FRAMES, GeneratedClip, clips, generate_with_music,
+};
 use crate::motion::bvh::{self, Axis, Bvh, channel_layout};
 use crate::music::RATE;
 use crate::run::check_output_folder;
@@ -18,10 +21,11 @@ pub struct ChoreographyArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Number of clips; styles take turns
-    #[arg(long, default_value_t = ChoreographyConfig::default().clips)]
+    #[arg(long, default_value_t = ChoreographyConfig::default().clips, value_parser = within(CLIPS))]
     clips: usize,
     /// Frames of each clip, at 30 a second
-    #[arg(long, default_value_t = ChoreographyConfig::default().frames_per_clip)]
+    #[arg(long, default_value_t = ChoreographyConfig::default().frames_per_clip,
+        value_parser = within(FRAMES))]
     frames: usize,
     /// Number that the dances follow from
     #[arg(long, default_value_t = ChoreographyConfig::default().seed)]

@@ -20,7 +20,7 @@ use crate::evaluation::protocol::choose;
 use crate::evaluation::{
     EvaluatedData, EvaluationOptions, EvaluationRecord, ProtocolScores, TableRow, Tables,
 };
-use crate::run::{Subject, check_outputs};
+use crate::run::{Subject, check_outputs_beside};
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -33,15 +33,17 @@ pub struct EvaluateArgs {
     /// Which clips to score on
     #[arg(long, value_enum, default_value_t)]
     clips: ClipChoice,
-    /// Transition lengths N to score at, frames, instead of the paper's 10, 50, 100 and 150; AVG is
-    /// the mean over these
-    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = within(1..=10_000u16))]
+    /// Transition lengths N to score at, frames, instead of the protocol's own, such as 10, 50, 100
+    /// and 150; AVG is the mean over these
+    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_hyphen_values = true,
+        value_parser = within(1..=10_000u16))]
     lengths: Vec<u16>,
     /// Score at most this many windows of each length, spread evenly over all: cheap, and not
     /// comparable with scores on all of them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     windows: Option<u32>,
-    /// Ways of counting to score by, such as published, instead of all that the model's paper has
+    /// Ways of counting to score by, instead of all that the model's paper has (they are listed
+    /// below)
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
     protocol: Vec<String>,
     /// Write the scores here, too; a run's folder gets those of its own model by all protocols, on
@@ -71,8 +73,9 @@ pub struct EvaluateArgs {
 /// then. A file cannot be written.
 pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     let subject = Subject::open(&args.run, &args.set)?;
-    let inputs = subject.files();
-    check_outputs(&args.json, inputs.iter().chain([&args.data]), args.force)?;
+    let own = subject.files();
+    let inputs = own.iter().chain([&args.data]);
+    check_outputs_beside(args.out.as_deref(), &args.json, inputs, args.force)?;
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
     warn(&dataset.warnings);
     if !args.other_data {
@@ -80,7 +83,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     }
     let mut out = std::io::stdout();
     let part = DataPart::from(args.clips);
-    let data = EvaluatedData::of(&dataset, part)?;
+    let mut data = EvaluatedData::of(&dataset, part)?;
     let folder = subject.scores_folder(args.out.as_deref(), &data, args.force)?;
     if subject.run.is_some() && folder.is_none() {
         warn(["the run keeps its scores on other clips; --force replaces them"]);
@@ -129,6 +132,8 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
             "\nat most {most} windows of each length: not comparable with scores on all"
         )?;
     }
+    let bound = options.most_windows;
+    data.most_windows = bound.filter(|&most| scores.most_windows() >= most);
     let record = EvaluationRecord { scores, data };
     let all = args.lengths.is_empty() && args.windows.is_none() && args.protocol.is_empty();
     let of_its_own = match &subject.run {

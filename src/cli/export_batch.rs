@@ -22,12 +22,13 @@ pub struct ExportBatchArgs {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Frames of a transition; for a model of rotations of a window, its keyframes among them
-    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    frames: u16,
+    /// [default: 30; a model that dances to music has windows of one length only]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    frames: Option<u16>,
     /// Windows in the batch
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1024))]
     windows: u16,
-    /// Feed the true frames instead of the model's predictions
+    /// Feed the true frames instead of the model's predictions, where it is fed these
     #[arg(long)]
     ground_truth: bool,
     /// Compute in f64; models of rotations alone can
@@ -53,7 +54,7 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
         streams: Streams::new(config.seed),
     };
     let options = ExportOptions {
-        frames: args.frames.into(),
+        frames: args.frames.map(usize::from),
         windows: args.windows.into(),
         ground_truth: args.ground_truth,
         double: args.f64,

@@ -12,7 +12,7 @@ use super::threads::Threads;
 use crate::counted::counted;
 use crate::data::Dataset;
 use crate::report::figures::FigureRequest;
-use crate::run::{Subject, check_output_folder, check_outputs, replace_file};
+use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
 /// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al.
 ///
@@ -72,7 +72,8 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         .collect::<Result<_, _>>()?;
     let models = compared.iter().chain([&subject]);
     let inputs: Vec<PathBuf> = models.flat_map(Subject::files).collect();
-    check_outputs(&args.viewer, inputs.iter().chain([&args.data]), args.force)?;
+    let inputs = inputs.iter().chain([&args.data]);
+    check_outputs_beside(Some(&args.out), &args.viewer, inputs, args.force)?;
     check_output_folder(&args.out, args.force)?;
     let paper = subject.config.paper();
     let paper = paper.context("the model is not in the registry")?;

@@ -67,7 +67,7 @@ pub struct GenerateArgs {
     /// song: one HTML page that needs no network
     #[arg(long, value_name = "OUT.html")]
     viewer: Option<PathBuf>,
-    /// Write what is printed here, too, as JSON
+    /// Write what is printed here, too, as JSON with its units
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Override a key of the config; of a run's model only one that acts after the network, such

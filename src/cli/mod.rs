@@ -60,14 +60,14 @@ enum Command {
     /// Train a model
     #[command(after_help = include_str!("help/train.txt"))]
     Train(train::TrainArgs),
-    /// Score a trained model, or interpolation, by its paper's protocols: LRP, AVF, ART
+    /// Score a trained model, or one that needs no training, by its paper's protocols
     #[command(after_help = include_str!("help/evaluate.txt"))]
     Evaluate(evaluate::EvaluateArgs),
     #[command(after_help = include_str!("help/generate.txt"))]
     Generate(Box<generate::GenerateArgs>),
     #[command(after_help = include_str!("help/reproduce.txt"))]
     Reproduce(reproduce::ReproduceArgs),
-    /// Set scores beside the paper's in its tables 2 to 4
+    /// Set scores beside the paper's in its tables
     #[command(after_help = include_str!("help/tables.txt"))]
     Tables(tables::TablesArgs),
     #[command(after_help = include_str!("help/figures.txt"))]

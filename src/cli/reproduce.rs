@@ -26,7 +26,7 @@ use crate::training::{Resumed, Trainer, TrainingError};
 /// Train and evaluate every config of a folder, and write tables, figures and a manifest
 ///
 /// Train every config of a folder that is not trained yet, evaluate it on the test clips and write
-/// tables 2 to 4 with the paper's value, ours and the difference, figures and a manifest.
+/// the paper's tables with its value, ours and the difference, figures and a manifest.
 ///
 /// A row whose results are in OUT is done. A row whose run is in RUNS goes on from its newest
 /// checkpoint, also after a kill; the end is the same to the bit as without the break. Tables are

@@ -13,7 +13,8 @@ use crate::run::RunFolder;
 ///
 /// Look into the folders inside it, too. A run is "running" while a training writes to it,
 /// "stopped" after Ctrl-C and "interrupted" after a kill or an error: both go on with `keydance
-/// train --resume`. LRP is in cm, at transitions of 10 to 150 frames, once evaluated.
+/// train --resume`. Once evaluated: LRP in cm, at transitions of 10 to 150 frames, or the first
+/// metric of the model's own protocol.
 #[derive(Debug, Args)]
 pub struct RunsArgs {
     /// Folder of runs, or a run's folder

@@ -34,6 +34,9 @@ pub struct EvaluatedData {
     pub clips: usize,
     #[serde(alias = "test_frames")]
     pub frames: usize,
+    /// At most so many windows of each length were scored, where that left some out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most_windows: Option<usize>,
     /// Digest of the whole data set, see [`Dataset::digest`].
     pub data_digest: String,
     /// Version of keydance that evaluated, and its commit where it was built in a git checkout.
@@ -50,6 +53,7 @@ impl EvaluatedData {
             part,
             clips: clips.len(),
             frames: clips.iter().map(Recording::frames).sum(),
+            most_windows: None,
             data_digest: dataset.digest.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
@@ -59,11 +63,20 @@ impl EvaluatedData {
     /// What the scores were measured on, for a caption.
     pub fn caption(&self) -> String {
         format!(
-            "{}, {} frames, of the data with digest {}",
+            "{}{}, {} frames, of the data with digest {}",
+            self.windows(),
             counted(self.clips, "test clip"),
             thousands(self.frames as u64),
             self.data_digest
         )
+    }
+
+    /// "at most 200 windows of each length of ", where not all were scored.
+    pub fn windows(&self) -> String {
+        match self.most_windows {
+            Some(most) => format!("at most {most} windows of each length of "),
+            None => String::new(),
+        }
     }
 }
 

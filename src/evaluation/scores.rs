@@ -129,6 +129,12 @@ impl ProtocolScores {
         found.map(|(_, scores)| scores)
     }
 
+    /// The largest number of windows behind a column.
+    pub fn most_windows(&self) -> usize {
+        let scores = self.iter().flat_map(|(_, scores)| scores.windows());
+        scores.map(|&(_, count)| count).max().unwrap_or(0)
+    }
+
     /// All scores by protocol, in their order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Scores)> {
         let protocols = self.protocols.iter();

@@ -75,7 +75,8 @@ impl EvaluatedRun {
         });
         let windows = windows.collect::<Vec<_>>().join(", ");
         format!(
-            "on {} ({} frames, windows by length {windows}) of data with digest {}",
+            "on {}{} ({} frames, windows by length {windows}) of data with digest {}",
+            data.windows(),
             counted(data.clips, "test clip"),
             data.frames,
             data.data_digest

@@ -13,12 +13,33 @@ use crate::data::Window;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ExportOptions {
     /// Frames of a transition; for a model of rotations of a window, its keyframes among them.
-    pub frames: usize,
+    /// None: [`FRAMES`], or the length of a model that has no such choice.
+    pub frames: Option<usize>,
     pub windows: usize,
     /// Feed the true frames to a model that is fed its own.
     pub ground_truth: bool,
     /// Compute in f64.
     pub double: bool,
+}
+
+/// Frames of a transition or window where none are asked for.
+pub const FRAMES: usize = 30;
+
+impl ExportOptions {
+    /// Refuses `ground_truth` of a model that is not fed its own predictions.
+    ///
+    /// # Errors
+    /// It is asked for.
+    pub fn check_not_fed(&self) -> Result<(), ModelError> {
+        match self.ground_truth {
+            false => Ok(()),
+            true => Err(ModelError::Data {
+                reason: "--ground-truth: the model is never fed the true frames in place of its \
+                         own; leave it out"
+                    .into(),
+            }),
+        }
+    }
 }
 
 /// Arrays by name.
@@ -92,23 +113,23 @@ impl ExportedBatch {
     }
 }
 
-/// As many of the windows as are asked for, spread evenly; `all` have `frames` frames each.
+/// So many of the windows, spread evenly; `all` have the `needed` frames that `frames` of the model
+/// take.
 ///
 /// # Errors
 /// There are none.
 pub fn spread(
     all: &[Window],
+    count: usize,
     frames: usize,
-    options: &ExportOptions,
+    needed: usize,
 ) -> Result<Vec<Window>, ModelError> {
     if all.is_empty() {
         return Err(ModelError::Data {
             reason: format!(
-                "no training clip has the {frames} frames that --frames {} needs",
-                options.frames
+                "no training clip has the {needed} frames that --frames {frames} needs"
             ),
         });
     }
-    let count = options.windows;
     Ok((0..count).map(|k| all[k * all.len() / count]).collect())
 }

@@ -143,6 +143,12 @@ pub trait Generator: Send + Sync {
         FeatureSet::default()
     }
 
+    /// Most frames from one given pose to the next, both counted, that it answers; none where there
+    /// is no bound.
+    fn longest_span(&self) -> Option<usize> {
+        None
+    }
+
     /// How a recording's foot in contact is told where the model is given it.
     fn contact_rule(&self) -> ContactRule {
         ContactRule::default()

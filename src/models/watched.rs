@@ -44,6 +44,10 @@ impl Generator for Watched<'_> {
         self.model.music_features()
     }
 
+    fn longest_span(&self) -> Option<usize> {
+        self.model.longest_span()
+    }
+
     fn contact_rule(&self) -> ContactRule {
         self.model.contact_rule()
     }

@@ -1,7 +1,8 @@
 //! What was heard in a file, remembered by the file's content.
 //!
 //! ```text
-//! magic "KDMUSIC\0" | format version, u32 | warnings and analysis, bincode | SHA-256 of all before
+//! magic "KDMUSIC\0" | format version, u32 | the sound file's SHA-256, warnings, analysis, bincode |
+//! SHA-256 of all before
 //! ```
 
 use std::fs::{self, File};
@@ -23,7 +24,7 @@ use crate::run::{FileError, replace_file};
 
 const MAGIC: &[u8; 8] = b"KDMUSIC\0";
 /// To be raised whenever what is heard changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CHECKSUM: usize = 32;
 /// Bytes of an hour's analysis, with room: lists grow as they are read.
 const LARGEST: usize = 1 << 28;
@@ -75,7 +76,7 @@ impl Cache {
     }
 
     /// What is heard in a sound file: remembered where a file of the same content was heard before,
-    /// else heard now. A damaged entry is made again.
+    /// else heard now. An entry that is damaged, or another file's, is made again.
     ///
     /// # Errors
     /// The file cannot be read or heard. That the cache cannot be written is a warning.
@@ -88,11 +89,11 @@ impl Cache {
             source,
         })?;
         let entry = folder.join(format!("{digest}.heard"));
-        if let Some(known) = known(&entry) {
+        if let Some(known) = known(&entry, &digest) {
             return Ok(known);
         }
         let mut heard = heard(path)?;
-        if let Err(error) = remember(folder, &entry, &heard) {
+        if let Err(error) = remember(folder, &entry, &digest, &heard) {
             let warning = format!("is heard again next time: {error}");
             heard.warnings.push(warning);
         }
@@ -120,9 +121,9 @@ fn digest(path: &Path) -> io::Result<String> {
     }
 }
 
-fn remember(folder: &Path, entry: &Path, heard: &Heard) -> Result<(), FileError> {
+fn remember(folder: &Path, entry: &Path, digest: &str, heard: &Heard) -> Result<(), FileError> {
     fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
-    let payload = (&heard.warnings, &heard.analysis);
+    let payload = (digest, &heard.warnings, &heard.analysis);
     let payload = bincode::serde::encode_to_vec(payload, FORMAT)
         .map_err(io::Error::other)
         .map_err(FileError::at(entry, "written"))?;
@@ -134,8 +135,9 @@ fn remember(folder: &Path, entry: &Path, heard: &Heard) -> Result<(), FileError>
     replace_file(entry, content)
 }
 
-/// What an entry holds, none where it is not there, damaged or of another version.
-fn known(entry: &Path) -> Option<Heard> {
+/// What an entry holds; none where it is not there, damaged, of another version or of a sound file
+/// with another digest.
+fn known(entry: &Path, digest: &str) -> Option<Heard> {
     let length = entry.metadata().ok()?.len();
     if length > (LARGEST + 1024) as u64 {
         return None;
@@ -149,10 +151,11 @@ fn known(entry: &Path) -> Option<Heard> {
     if u32::from_le_bytes(*version) != VERSION {
         return None;
     }
-    let decoded: ((Vec<String>, Analysis), usize) =
+    let decoded: ((String, Vec<String>, Analysis), usize) =
         bincode::serde::decode_from_slice(payload, FORMAT).ok()?;
-    let ((warnings, analysis), used) = decoded;
-    (used == payload.len() && fits(&analysis)).then_some(Heard { analysis, warnings })
+    let ((of, warnings, analysis), used) = decoded;
+    (used == payload.len() && of == digest && fits(&analysis))
+        .then_some(Heard { analysis, warnings })
 }
 
 /// Whether all parts have the frames of the samples.

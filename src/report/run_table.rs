@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::thousands;
-use crate::evaluation::EvaluationRecord;
+use crate::evaluation::scores::AVERAGE;
+use crate::evaluation::{EvaluationRecord, Protocol, ProtocolScores};
 use crate::experiment::ExperimentConfig;
 use crate::run::{RunError, RunFolder, RunProgress, RunState};
 
@@ -13,7 +14,7 @@ use crate::run::{RunError, RunFolder, RunProgress, RunState};
 const DEEPEST: usize = 4;
 /// Transition lengths whose LRP is shown, frames.
 const LENGTHS: [usize; 4] = [10, 50, 100, 150];
-const HEADER: [&str; 12] = [
+const HEADER: [&str; 13] = [
     "run",
     "name",
     "state",
@@ -25,10 +26,15 @@ const HEADER: [&str; 12] = [
     "50",
     "100",
     "150",
+    "score",
     "made by",
 ];
+/// Columns of scores: each is left out where no run has any in it.
+const LRP: usize = 7;
+const SCORE: usize = LRP + LENGTHS.len();
+const MADE_BY: usize = SCORE + 1;
 /// Columns of text; the others hold numbers and are aligned on the right.
-const TEXT: [usize; 4] = [0, 1, 2, 11];
+const TEXT: [usize; 5] = [0, 1, 2, SCORE, MADE_BY];
 
 /// The runs at and below a folder, by their paths; its `Display` is a table, and a line for each
 /// thing that is wrong with a run.
@@ -68,11 +74,18 @@ impl fmt::Display for RunTable {
             let cells = lines().map(|line| line[column].chars().count());
             cells.max().unwrap_or_default()
         });
+        let is_shown = |column: usize| {
+            let mut rows = self.rows.iter();
+            !(LRP..MADE_BY).contains(&column) || rows.any(|row| !row.cells[column].is_empty())
+        };
+        let shown: Vec<usize> = (0..HEADER.len()).filter(|&it| is_shown(it)).collect();
         for line in lines() {
-            let cells = line.iter().zip(widths).enumerate();
-            let cells = cells.map(|(column, (cell, width))| match TEXT.contains(&column) {
-                true => format!("{cell:<width$}"),
-                false => format!("{cell:>width$}"),
+            let cells = shown.iter().map(|&column| {
+                let (cell, width) = (&line[column], widths[column]);
+                match TEXT.contains(&column) {
+                    true => format!("{cell:<width$}"),
+                    false => format!("{cell:>width$}"),
+                }
             });
             let line = cells.collect::<Vec<_>>().join("  ");
             writeln!(f, "{}", line.trim_end())?;
@@ -127,7 +140,7 @@ impl RunLine {
             row.problems.push(error.to_string());
         }
         match EvaluationRecord::read(folder) {
-            Ok(record) => row.score(&record),
+            Ok(record) => row.score(&record, &RunFolder::open(folder)),
             Err(error) if EvaluationRecord::is_in(folder) => row.problems.push(error.to_string()),
             Err(_) => {}
         }
@@ -156,21 +169,44 @@ impl RunLine {
         if let Some(speed) = progress.frame_steps_per_second {
             self.cells[6] = format!("{speed:.0}");
         }
-        self.cells[11] = version(&manifest.version, manifest.commit.as_deref());
+        self.cells[MADE_BY] = version(&manifest.version, manifest.commit.as_deref());
     }
 
-    fn score(&mut self, record: &EvaluationRecord) {
+    fn score(&mut self, record: &EvaluationRecord, run: &RunFolder) {
         let EvaluationRecord { scores, data } = record;
-        if self.cells[11].is_empty() {
-            self.cells[11] = version(&data.version, data.commit.as_deref());
+        if self.cells[MADE_BY].is_empty() {
+            self.cells[MADE_BY] = version(&data.version, data.commit.as_deref());
         }
-        for (cell, length) in self.cells[7..].iter_mut().zip(LENGTHS) {
+        for (cell, length) in self.cells[LRP..].iter_mut().zip(LENGTHS) {
             let mut protocols = scores.iter();
             if let Some(score) = protocols.find_map(|(_, scores)| scores.row("lrp")?.at(length)) {
                 *cell = format!("{score:.1}");
             }
         }
+        let is_empty = |cell: &String| cell.is_empty();
+        if self.cells[LRP..SCORE].iter().all(is_empty)
+            && let Ok(config) = run.config()
+        {
+            let score = first_score(&config.protocols(), scores);
+            self.cells[SCORE] = score.unwrap_or_default();
+        }
     }
+}
+
+/// The first metric of the first of these protocols, by its name: its mean over all columns where
+/// there is one, else its first column, such as "L2Q, local 0.41 (N = 10)".
+fn first_score(protocols: &[Box<dyn Protocol>], scores: &ProtocolScores) -> Option<String> {
+    let protocol = protocols.first()?;
+    let metric = protocol.metrics().first()?;
+    let row = scores.by(protocol.name())?.row(metric.key)?;
+    let mean = row.columns().find(|column| *column == AVERAGE);
+    let column = mean.or_else(|| row.columns().next())?;
+    let (title, digits, score) = (metric.title, metric.decimals, row.at(column)?);
+    let column = match column.parse::<u64>() {
+        Ok(number) => format!("{} = {number}", protocol.number()),
+        Err(_) => column.into(),
+    };
+    Some(format!("{title} {score:.digits$} ({column})"))
 }
 
 /// A version and the first digits of its commit.

@@ -21,6 +21,6 @@ pub use error::RunError;
 pub use folder::RunFolder;
 pub use log::LogLine;
 pub use manifest::{Manifest, RunState};
-pub use output::{beside_clips, check_output_folder, check_outputs};
+pub use output::{beside_clips, check_output_folder, check_outputs, check_outputs_beside};
 pub use status::RunProgress;
 pub use subject::Subject;

@@ -15,8 +15,22 @@ use crate::data::{clip_files, is_clip};
 ///
 /// # Errors
 /// A file is an input by whatever name or link, would be a clip of a folder that is read, belongs
-/// to a run, is a folder, is named twice, or is there already without `force`.
+/// to a run, is a folder or in one that is not there, is named twice, or is there already without
+/// `force`.
 pub fn check_outputs<'a>(
+    files: impl IntoIterator<Item = &'a PathBuf>,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+    force: bool,
+) -> Result<(), RunError> {
+    check_outputs_beside(None, files, inputs, force)
+}
+
+/// The same of a command that makes a folder, `made`, before it writes the files.
+///
+/// # Errors
+/// As [`check_outputs`].
+pub fn check_outputs_beside<'a>(
+    made: Option<&Path>,
     files: impl IntoIterator<Item = &'a PathBuf>,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
     force: bool,
@@ -31,6 +45,12 @@ pub fn check_outputs<'a>(
         };
         if place.is_dir() {
             return refused("is a folder; name a file in it".into());
+        }
+        if let Some(folder) = missing_folder(file, made) {
+            let folder = folder.display();
+            return refused(format!(
+                "cannot be written: there is no folder {folder}; make it, or give another file"
+            ));
         }
         // What is there and no file is a pipe or a device: nothing is lost.
         if place.exists() && !place.is_file() {
@@ -68,6 +88,14 @@ pub fn check_outputs<'a>(
         }
     }
     Ok(())
+}
+
+/// The folder of a file where it is not there and is not on the way to `made`.
+fn missing_folder<'a>(file: &'a Path, made: Option<&Path>) -> Option<&'a Path> {
+    let folder = file.parent().filter(|folder| *folder != Path::new(""))?;
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let is_made = made.is_some_and(|made| whole(made).starts_with(whole(folder)));
+    (!folder.is_dir() && !is_made).then_some(folder)
 }
 
 /// Refuses a folder to write to that holds anything, unless `force`.

@@ -8,7 +8,7 @@ use super::folder::RunFolder;
 use super::output::{check_output_folder, place};
 use crate::data::{Dataset, is_clip};
 use crate::evaluation::{EvaluatedData, EvaluationRecord};
-use crate::experiment::ExperimentConfig;
+use crate::experiment::{ConfigError, ExperimentConfig};
 use crate::models::Generator;
 
 /// A model to work with, its config, and where they come from.
@@ -21,12 +21,37 @@ pub struct Subject {
     pub run: Option<RunFolder>,
 }
 
+/// Refuses a config that differs from the run's in what the run's model was trained with.
+fn check_trained_values(run: &RunFolder, config: &ExperimentConfig) -> Result<(), RunError> {
+    let trained = run.config()?;
+    if trained.model.untrained(&trained.data).is_some() {
+        return Ok(());
+    }
+    let own = trained.model.tables().map_err(ConfigError::from)?;
+    let mut differences = trained.training_differences(config)?;
+    differences.retain(|difference| {
+        let table = difference.split(['.', ':']).next();
+        table.is_some_and(|table| own.contains_key(table))
+    });
+    match &differences[..] {
+        [] => Ok(()),
+        _ => Err(RunError::Refused(format!(
+            "{} holds a trained model: its size, and what else it was trained with, cannot be \
+             changed any more ({}; values there, values now); leave these --set out, or train \
+             another model with them",
+            run.newest_weights()?.display(),
+            differences.join("; ")
+        ))),
+    }
+}
+
 impl Subject {
     /// Opens a run's folder, or the config of a model that needs no training; `set` overrides keys
     /// of the config.
     ///
     /// # Errors
-    /// There is no such run or config, its model is not trained, or its weights are damaged.
+    /// There is no such run or config, its model is not trained, or its weights are damaged; `set`
+    /// overrides what a run's model was trained with.
     pub fn open(path: &Path, set: &[String]) -> Result<Self, RunError> {
         let run = path.is_dir().then(|| RunFolder::open(path));
         let file = run.as_ref().map_or(path.into(), RunFolder::config_path);
@@ -38,6 +63,9 @@ impl Subject {
             )));
         }
         let config = ExperimentConfig::load(&file, set)?;
+        if let Some(run) = run.as_ref().filter(|_| !set.is_empty()) {
+            check_trained_values(run, &config)?;
+        }
         let (model, source) = match (config.model.untrained(&config.data), &run) {
             (Some(model), _) => (model, format!(" of {path}")),
             (None, Some(run)) => {

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::SynthesisError;
 use super::request::check_times;
+use super::summary::Units;
 use crate::counted::counted;
 use crate::models::generator::{Condition, Given, Request};
 use crate::models::{Generator, Streams};
@@ -230,6 +231,7 @@ pub struct CompletionSummary {
     /// Mean distance that the standing foot moves a frame, cm/frame.
     standing_foot_speed: Option<f64>,
     warnings: Vec<String>,
+    units: Units,
 }
 
 #[derive(Debug, Serialize)]
@@ -262,6 +264,11 @@ impl CompletionSummary {
             keyframes: [first].into_iter().chain(others).collect(),
             standing_foot_speed: completion.foot_speed,
             warnings,
+            units: Units::from([
+                ("fps", "frames/s"),
+                ("root_gap", "cm"),
+                ("standing_foot_speed", "cm/frame"),
+            ]),
         }
     }
 }

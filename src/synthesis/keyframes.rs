@@ -144,15 +144,30 @@ impl FileFrom {
 }
 
 impl FromStr for FileFrom {
-    type Err = std::convert::Infallible;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let framed = text.rsplit_once(':');
-        let framed = framed.and_then(|(file, frame)| Some((file, frame.parse().ok()?)));
-        let said = framed.is_some();
-        let (file, frame) = framed.unwrap_or((text, 0));
-        let file = file.into();
-        Ok(Self { file, frame, said })
+        // A drive's letter, too, stands before a colon.
+        let is_name = text.to_lowercase().ends_with(".bvh");
+        let (file, frame) = match framed.filter(|_| !is_name) {
+            Some((file, frame)) => match frame.trim().parse() {
+                Ok(frame) => (file, Some(frame)),
+                Err(_) => {
+                    return Err(
+                        "expected FILE.bvh or FILE.bvh:FRAME, FRAME a whole number from 0 \
+                                on"
+                        .into(),
+                    );
+                }
+            },
+            None => (text, None),
+        };
+        Ok(Self {
+            file: file.into(),
+            frame: frame.unwrap_or(0),
+            said: frame.is_some(),
+        })
     }
 }
 

@@ -39,7 +39,7 @@ pub fn random_key_frames(
 /// goes on from the recorded one's beginning. Everything follows from `seed` and `number`.
 ///
 /// # Errors
-/// As [`Song::read`].
+/// As [`Song::read`]; a recorded dance no longer than the seed.
 pub fn regeneration(
     settings: &Pu2022Settings,
     model: &dyn Generator,
@@ -55,8 +55,19 @@ pub fn regeneration(
         frames: None,
         mapping: None,
     };
-    let plain = Song::read(&choice, model, data, cache)?;
+    let short = |found, needed| SongError::ShortDance {
+        clip: clip.into(),
+        found,
+        needed,
+    };
+    let plain = Song::read(&choice, model, data, cache).map_err(|error| match error {
+        SongError::ShortSeed { found, needed, .. } => short(found, needed),
+        other => other,
+    })?;
     let frames = plain.request.frames.min(plain.seed_clip_frames());
+    if frames <= plain.seed {
+        return Err(short(frames, plain.seed));
+    }
     let mut stream = Streams::new(seed).stream("regeneration", &[number]);
     let keys = random_key_frames(settings, frames, &mut stream);
     let key_poses = keys.into_iter().map(|frame| FileKeyframe {

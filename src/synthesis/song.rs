@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use super::clip_keyframes::{Source, no_frame, read};
 use super::keyframes::{FileFrom, FileKeyframe, KeyframeError, LONGEST};
+use super::summary::Units;
 use crate::counted::counted;
 use crate::data::DataConfig;
 use crate::models::generator::{Given, Motion, NeededPoses, Request};
@@ -79,6 +80,15 @@ pub enum SongError {
     ShortSeed {
         file: PathBuf,
         first: usize,
+        found: usize,
+        needed: usize,
+    },
+    #[error(
+        "{clip} has {}, and the model goes on from the first {} of a dance; give a longer dance",
+        counted(*found, "frame"), counted(*needed, "frame")
+    )]
+    ShortDance {
+        clip: PathBuf,
         found: usize,
         needed: usize,
     },
@@ -174,9 +184,13 @@ impl Song {
         let (seed, held) = files.seed(&choice.seed, needed)?;
         let keys = files.key_poses(&choice.key_poses, &seed[0], needed, frames)?;
         notices.append(&mut files.notices);
-        let near = keys.iter().filter(|(frame, _)| *frame < needed + NEAR);
+        let (last, free) = (needed.saturating_sub(1), needed + NEAR);
+        let near = keys.iter().filter(|(frame, _)| *frame < free);
         notices.extend(near.map(|(frame, _)| {
-            format!("the key pose at frame {frame} comes within {NEAR} frames of the seed's end")
+            format!(
+                "the key pose at frame {frame} comes within {NEAR} frames of the seed, whose last \
+                 frame is {last}, so the dance may jerk to it; put it at frame {free} or later"
+            )
         }));
         let path = match &choice.seed {
             Seed::Motion(path, _) => path,
@@ -264,6 +278,12 @@ impl Song {
             seed_frames: self.seed,
             seed_is_held: self.held,
             key_poses: key_poses.collect(),
+            units: Units::from([
+                ("seconds", "s"),
+                ("tempo", "beats/min"),
+                ("metre", "beats/bar"),
+                ("distance", "cm"),
+            ]),
         }
     }
 
@@ -382,6 +402,7 @@ pub struct SongSummary {
     seed_frames: usize,
     seed_is_held: bool,
     key_poses: Vec<KeyPoseMiss>,
+    units: Units,
 }
 
 #[derive(Debug, Serialize)]

@@ -1,11 +1,15 @@
 //! What there is to say of a sequence: as text and as JSON.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 
 use super::{ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error};
 use crate::counted::counted;
+
+/// The units of the numbers beside it, by their names.
+pub(super) type Units = BTreeMap<&'static str, &'static str>;
 
 /// The numbers of a generated sequence. Distances in cm, frames of the result.
 #[derive(Debug, Serialize)]
@@ -23,6 +27,7 @@ pub struct Summary {
     /// The same after the feet were pinned; none where they were not.
     foot_skate_cleaned: Option<f64>,
     warnings: Vec<String>,
+    units: Units,
 }
 
 #[derive(Debug, Serialize)]
@@ -71,6 +76,14 @@ impl Summary {
             foot_skate: sequence.foot_skate.before,
             foot_skate_cleaned: sequence.foot_skate.after.filter(|_| options.foot_cleanup),
             warnings: warnings.iter().map(ToString::to_string).collect(),
+            units: Units::from([
+                ("fps", "frames/s"),
+                ("missed", "cm"),
+                ("trajectory_error", "cm"),
+                ("rotation_fit_error", "cm"),
+                ("foot_skate", "cm/frame"),
+                ("foot_skate_cleaned", "cm/frame"),
+            ]),
         }
     }
 }

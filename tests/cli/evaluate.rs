@@ -351,6 +351,28 @@ fn tables_set_runs_beside_the_paper_and_say_their_budget() {
         .unwrap();
     let difference = format!("{:+.2}", lrp - 124.47);
     assert!(text.contains(&difference), "{difference}: {text}");
+    assert!(!text.contains("windows of each length"), "{text}");
+}
+
+#[test]
+fn tables_say_where_only_a_part_of_the_windows_was_scored() {
+    let out = TempDir::new().unwrap();
+    let (scores, tables) = (out.path().join("scores"), out.path().join("tables.md"));
+    for (most, said) in [("3", true), ("9999", false)] {
+        let mut command = evaluate(&FIXTURE.path("interpolation.toml"));
+        command.args(["--windows", most, "--out"]).arg(&scores);
+        command.assert().success();
+        let mut command = keydance("tables");
+        command
+            .arg(&scores)
+            .arg("--force")
+            .arg("--out")
+            .arg(&tables);
+        command.assert().success();
+        let text = fs::read_to_string(&tables).unwrap();
+        let words = "Ours on at most 3 windows of each length of 2 test clips";
+        assert_eq!(text.contains(words), said, "{text}");
+    }
 }
 
 #[test]

@@ -5,6 +5,9 @@ use std::path::Path;
 
 use clap::Parser as _;
 use keydance::cli::Cli;
+use keydance::data::DataConfig;
+use keydance::evaluation::EvaluationOptions;
+use keydance::models::registry;
 
 use crate::small_run::keydance;
 
@@ -74,6 +77,20 @@ fn the_version_has_the_commit_that_it_was_built_from() {
     assert!(text.starts_with(version), "{text}");
     if let Some(commit) = option_env!("KEYDANCE_COMMIT") {
         assert!(text.contains(&format!("(commit {commit})")), "{text}");
+    }
+}
+
+#[test]
+fn the_help_of_evaluate_lists_the_protocols_of_every_paper() {
+    let text = said(&["evaluate", "--help"]);
+    let (data, options) = (DataConfig::default(), EvaluationOptions::default());
+    for paper in registry::papers() {
+        let mut lines = text.lines().map(str::trim);
+        let line = lines.find(|line| line.starts_with(&format!("{} ", paper.name)));
+        let line = line.expect(paper.name);
+        for protocol in (paper.protocols)(&data, &options) {
+            assert!(line.contains(protocol.name()), "{line}");
+        }
     }
 }
 

@@ -193,3 +193,19 @@ fn the_sound_itself_is_never_written_over() {
     assert!(stderr(&output).contains("is what the command reads"));
     assert_eq!(fs::read(&song.file).unwrap(), clicks(1));
 }
+
+#[test]
+fn where_one_of_two_outputs_cannot_be_written_neither_is() {
+    let song = Song::new(&clicks(1));
+    let (npy, json) = (song.path("features.npy"), song.path("no/beats.json"));
+    let output = song.hear(&[
+        "--npy",
+        npy.to_str().unwrap(),
+        "--json",
+        json.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = stderr(&output);
+    assert!(said.contains("beats.json cannot be written: there is no folder"));
+    assert!(!npy.exists() && !song.path("user").exists());
+}

@@ -225,6 +225,31 @@ fn what_is_there_stays_unless_force_is_given() {
 }
 
 #[test]
+fn an_output_in_a_folder_that_is_not_there_is_refused_before_anything_is_written() {
+    let folder = place();
+    let place = folder.path();
+    let generate = format!("{GENERATE} --out new.bvh");
+    for command in [
+        &format!("{GENERATE} --out no/new.bvh"),
+        &format!("{generate} --viewer no/page.html"),
+        &format!("{generate} --json no/new.json"),
+        "features a.bvh --npy no/new.npy",
+        "evaluate run --data data --json no/new.json",
+        "evaluate interpolation.toml --data data --out scores --json no/new.json",
+        "export-batch run --data data --out no/new.safetensors",
+        "tables run --out no/tables.md",
+        "figures run --data data --out new --viewer no/page.html",
+    ] {
+        refused(place, command, "cannot be written: there is no folder no;");
+        refused(
+            place,
+            &format!("{command} --force"),
+            "there is no folder no;",
+        );
+    }
+}
+
+#[test]
 fn what_a_run_consists_of_is_written_by_the_run_alone() {
     let folder = place();
     let place = folder.path();
@@ -279,7 +304,9 @@ fn what_a_user_keeps_in_a_runs_folder_is_written_and_replaced_as_elsewhere() {
         "generate run --motion a.bvh --keyframes 0,40 --out run/new.bvh",
         "evaluate run --data data --lengths 10 --json run/new.json",
         "tables run --out run/tables.md",
-        "figures run --data data --length 20 --out run/figures --viewer run/new.html",
+        "figures run --data data --length 20 --out run/figures --viewer run/figures/new.html",
+        // As above, and the scores in the folder that it makes.
+        "evaluate interpolation.toml --data data --out scores --json scores/new.json",
     ] {
         let words: Vec<&str> = command.split(' ').collect();
         let output = run(place, &words);

@@ -95,7 +95,39 @@ fn scores_are_those_of_the_in_betweening_protocol_beside_the_papers() {
         let scores = &scores["in_betweening"];
         assert!(scores["l2q_local"]["30"].as_f64().unwrap() > 0.0);
         assert_eq!(scores["windows"]["50"], scores["windows"]["10"]);
+        let mut command = keydance("runs");
+        let output = command.arg(FIXTURE.path(run)).assert().success();
+        output.stdout(
+            contains("L2Q, local")
+                .and(contains("(N = 10)"))
+                .and(contains("LRP").not()),
+        );
     }
+}
+
+#[test]
+fn lengths_that_a_model_was_not_trained_on_are_left_out_of_its_scores() {
+    let folder = TempDir::new().unwrap();
+    let scores = folder.path().join("scores.json");
+    fs::write(
+        FIXTURE.path("short.toml"),
+        LI.replace("max = 50", "max = 20"),
+    )
+    .unwrap();
+    FIXTURE.train("short", "short").assert().success();
+    let evaluate = |more: &[&str]| {
+        let mut command = keydance("evaluate");
+        command.arg(FIXTURE.path("short"));
+        command.arg("--data").arg(FIXTURE.path("data"));
+        command.args(more).assert()
+    };
+    let output = evaluate(&["--json", scores.to_str().unwrap()]).success();
+    output.stderr(contains("N = 30 is left out").and(contains("schedule.lengths.max")));
+    let scores: Value = serde_json::from_slice(&fs::read(&scores).unwrap()).unwrap();
+    let windows = scores["in_betweening"]["windows"].as_object().unwrap();
+    assert_eq!(windows.keys().collect::<Vec<_>>(), ["10"]);
+    let output = evaluate(&["--lengths", "30,40"]).failure();
+    output.stderr(contains("at most 20 frames").and(contains("give smaller --lengths")));
 }
 
 #[test]
@@ -135,6 +167,7 @@ fn the_standing_foot_stands_still_and_keyframes_keep_their_poses() {
     let gap = summary["keyframes"][1]["root_gap"].as_f64().unwrap();
     let found = dance.poses[24].translations[0].distance(recorded.poses[44].translations[0]);
     assert!((gap - found).abs() < 1e-6, "{gap} {found}");
+    assert_eq!(summary["units"]["root_gap"], "cm");
 }
 
 #[test]
@@ -298,6 +331,9 @@ fn a_batch_of_each_model_is_exported_with_its_losses() {
         command.args(["--frames", "12", "--windows", "3"]);
         command.arg("--out").arg(&out);
         command.assert().success();
+        command.args(["--force", "--ground-truth"]);
+        let refused = command.assert().failure();
+        refused.stderr(contains("--ground-truth: the model is never fed"));
         let batch = fs::read(&out).unwrap();
         let header = String::from_utf8_lossy(&batch[..batch.len().min(1 << 16)]).into_owned();
         for name in [

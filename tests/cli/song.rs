@@ -7,6 +7,7 @@ use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use keydance::motion::bvh;
+use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -95,9 +96,11 @@ fn a_whole_song_is_danced_from_the_seed_with_key_poses_at_its_seconds() {
     let mut command = FIXTURE.generate(&out);
     command.arg("--keyframe").arg(FIXTURE.key("75@4.5s"));
     command.arg("--keyframe").arg(FIXTURE.key("30@100"));
+    command.arg("--keyframe").arg(FIXTURE.key("10@22"));
     command.arg("--json").arg(&json);
     let output = command.assert().success();
-    output.stdout(contains("key pose at frame 135 (4.50 s)"));
+    let output = output.stdout(contains("key pose at frame 135 (4.50 s)"));
+    output.stderr(contains("the key pose at frame 22").and(contains("frame 25 or later")));
     let dance = bvh::read(&out).unwrap().to_clip();
     let recorded = bvh::read(&FIXTURE.file(0, "bvh")).unwrap().to_clip();
     assert_eq!(dance.poses.len(), 240);
@@ -107,7 +110,8 @@ fn a_whole_song_is_danced_from_the_seed_with_key_poses_at_its_seconds() {
     let summary: Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
     let keys = summary["key_poses"].as_array().unwrap().iter();
     let frames: Vec<u64> = keys.map(|key| key["frame"].as_u64().unwrap()).collect();
-    assert_eq!(frames, [100, 135]);
+    assert_eq!(frames, [22, 100, 135]);
+    assert_eq!(summary["units"]["distance"], "cm");
     assert_eq!(summary["seed_is_held"], false);
 }
 
@@ -157,6 +161,18 @@ fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
     let output = command.assert().failure();
     output.stderr(contains("is shorter than the seed, 20 frames"));
     assert!(!out.exists());
+    let mut command = FIXTURE.generate(&out);
+    command.args(["--until", "-5s"]);
+    let output = command.assert().failure().code(2);
+    output.stderr(contains("--until").and(contains("-5s is not from 0 to 86400 seconds")));
+    for seed in ["--seed-motion", "--seed-pose"] {
+        let mut command = FIXTURE.command("generate");
+        command.arg(FIXTURE.path("run")).arg("--out").arg(&out);
+        command.arg("--music").arg(FIXTURE.file(0, "wav"));
+        command.arg(seed).arg(FIXTURE.key("soon"));
+        let output = command.assert().failure().code(2);
+        output.stderr(contains("expected FILE.bvh or FILE.bvh:FRAME"));
+    }
     let mut command = FIXTURE.command("generate");
     command.arg(FIXTURE.path("run")).arg("--out").arg(&out);
     command
@@ -231,6 +247,42 @@ fn a_recorded_dance_is_regenerated_from_random_key_poses_of_it() {
         .assert()
         .failure()
         .stderr(contains("--force"));
+}
+
+#[test]
+fn a_dance_that_is_too_short_to_be_regenerated_is_named_with_both_lengths() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut command = FIXTURE.command("choreography");
+    command.args(["--clips", "1", "--frames", "15", "--out"]);
+    command.arg(path("short")).assert().success();
+    let clip = fs::read_dir(path("short")).unwrap().next().unwrap();
+    let mut command = FIXTURE.command("regenerate");
+    command.arg(FIXTURE.path("run")).arg(clip.unwrap().path());
+    command.arg("--music").arg(FIXTURE.file(0, "wav"));
+    command.arg("--out").arg(path("out"));
+    let output = command.assert().failure();
+    output.stderr(contains("has 15 frames").and(contains("the first 20 frames of a dance")));
+    assert!(!path("out").exists());
+}
+
+#[test]
+fn a_batch_has_the_windows_of_the_model_and_other_wishes_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("batch.safetensors");
+    let export = |more: &[&str]| {
+        let mut command = FIXTURE.command("export-batch");
+        command.arg(FIXTURE.path("run"));
+        command.arg("--data").arg(FIXTURE.path("data"));
+        command.args(["--windows", "2"]).args(more);
+        command.arg("--out").arg(&out).assert()
+    };
+    let refused = export(&["--frames", "30"]).failure();
+    refused.stderr(contains("--frames 30: the model's windows have 60 frames"));
+    let refused = export(&["--ground-truth"]).failure();
+    refused.stderr(contains("--ground-truth: the model is never fed"));
+    assert!(!out.exists());
+    export(&["--frames", "60"]).success();
 }
 
 #[test]

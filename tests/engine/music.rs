@@ -338,7 +338,7 @@ fn samples_that_are_no_numbers_count_as_none() {
 }
 
 #[test]
-fn the_same_content_is_heard_once_and_a_damaged_entry_is_made_again() {
+fn the_same_content_is_heard_once_and_a_damaged_entry_or_another_songs_is_made_again() {
     let folder = tempdir().unwrap();
     let cache = Cache::at(&folder.path().join("a/b"));
     let (one, two) = (folder.path().join("one.wav"), folder.path().join("two.ogg"));
@@ -361,7 +361,12 @@ fn the_same_content_is_heard_once_and_a_damaged_entry_is_made_again() {
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 1;
     let cut = whole[..whole.len() - 40].to_vec();
-    for damaged in [flipped, cut, Vec::new(), b"KDMUSIC\0".to_vec()] {
+    let (other, elsewhere) = (folder.path().join("other.wav"), folder.path().join("c"));
+    fs::write(&other, wav(&noise(30_000), 1, RATE)).unwrap();
+    Cache::at(&elsewhere).analysis(&other).unwrap();
+    let of_other = fs::read_dir(&elsewhere).unwrap().next().unwrap().unwrap();
+    let of_other = fs::read(of_other.path()).unwrap();
+    for damaged in [flipped, cut, Vec::new(), b"KDMUSIC\0".to_vec(), of_other] {
         fs::write(entry, damaged).unwrap();
         assert_eq!(cache.analysis(&one).unwrap(), heard);
         assert!(fs::read(entry).unwrap() == whole);

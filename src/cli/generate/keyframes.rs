@@ -16,7 +16,7 @@ pub struct KeyframeArgs {
     /// Frames of --motion that are keyframes, ascending, such as 120,180,260; the first becomes
     /// frame 0 of the result, the others keep their distances
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion",
-        value_parser = within(0..=usize::MAX))]
+        allow_hyphen_values = true, value_parser = within(0..=usize::MAX))]
     keyframes: Vec<usize>,
     /// A frame of any file as a keyframe, and its time in the result, a frame such as
     /// jump.bvh:75@60 or seconds such as jump.bvh:75@12.5s; may be repeated
@@ -28,7 +28,7 @@ pub struct KeyframeArgs {
     /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such
     /// as 100,250
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion", conflicts_with = "keyframe",
-        value_parser = within(1..=LONGEST))]
+        allow_hyphen_values = true, value_parser = within(1..=LONGEST))]
     pub length: Vec<u32>,
 }
 

@@ -42,7 +42,12 @@ pub struct SongArgs {
     #[arg(long, requires = "viewer")]
     embed_music: bool,
     /// End of the dance, where it is shorter than the song: frames, or seconds such as 30s
-    #[arg(long, value_name = "TIME", requires = "music")]
+    #[arg(
+        long,
+        value_name = "TIME",
+        requires = "music",
+        allow_hyphen_values = true
+    )]
     until: Option<Time>,
 }
 

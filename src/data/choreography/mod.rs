@@ -19,6 +19,8 @@ mod score;
 mod style;
 mod upper_body;
 
+use std::ops::RangeInclusive;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
@@ -34,13 +36,11 @@ use rhythm::{FRAME_RATE, Rhythm};
 use score::Score;
 use style::Style;
 
-/// Fewest frames of a clip: two, so that there is a velocity.
-const FEWEST_FRAMES: usize = 2;
-/// Most frames of a clip (about nine hours).
-const MOST_FRAMES: usize = 1_000_000;
+/// Frames that a clip may have: two, so that there is a velocity, to about nine hours.
+pub const FRAMES: RangeInclusive<usize> = 2..=1_000_000;
 
-/// Most clips, each held in memory until all are made.
-const MOST_CLIPS: usize = 1000;
+/// How many clips may be asked for, each held in memory until all are made.
+pub const CLIPS: RangeInclusive<usize> = 1..=1000;
 
 /// Distance (cm) from the middle of the floor at which a dancer turns back.
 const FARTHEST: f64 = 120.0;
@@ -73,10 +73,11 @@ impl Default for ChoreographyConfig {
 pub enum ChoreographyError {
     #[error("choreography: `clips` is 0; ask for at least one clip")]
     NoClips,
-    #[error("choreography: `clips` is {clips}; it must be at most {MOST_CLIPS}")]
+    #[error("choreography: `clips` is {clips}; it must be at most {}", CLIPS.end())]
     TooManyClips { clips: usize },
     #[error(
-        "choreography: `frames_per_clip` is {frames}; it must be between {FEWEST_FRAMES} and {MOST_FRAMES}"
+        "choreography: `frames_per_clip` is {frames}; it must be between {} and {}",
+        FRAMES.start(), FRAMES.end()
     )]
     Frames { frames: usize },
 }
@@ -116,12 +117,12 @@ fn check(config: &ChoreographyConfig) -> Result<(), ChoreographyError> {
     if config.clips == 0 {
         return Err(ChoreographyError::NoClips);
     }
-    if config.clips > MOST_CLIPS {
+    if !CLIPS.contains(&config.clips) {
         return Err(ChoreographyError::TooManyClips {
             clips: config.clips,
         });
     }
-    if !(FEWEST_FRAMES..=MOST_FRAMES).contains(&config.frames_per_clip) {
+    if !FRAMES.contains(&config.frames_per_clip) {
         return Err(ChoreographyError::Frames {
             frames: config.frames_per_clip,
         });

@@ -54,6 +54,8 @@ pub use npss::Npss;
 /// trained on others. They are given to it where it reads them, and the root that it is compared
 /// with is reconstructed from them.
 ///
+/// Lengths that the model was not trained to answer are left out, with a warning.
+///
 /// Clips may be on any skeleton that has the joints that feet and facing are told by, all on one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBetweening {
@@ -132,6 +134,34 @@ impl InBetweening {
 
     fn cut(&self, clip_frames: &[usize]) -> Vec<Window> {
         spread(self.set.scored.windows(clip_frames), self.most_windows)
+    }
+
+    /// The lengths that a model answers, and a warning of each of the others.
+    ///
+    /// # Errors
+    /// It answers none.
+    fn answered(
+        &self,
+        model: &dyn Generator,
+    ) -> Result<(Vec<usize>, Vec<String>), EvaluationError> {
+        let Some(longest) = model.longest_span() else {
+            return Ok((self.lengths.clone(), Vec::new()));
+        };
+        let why = format!(
+            "{} was trained on at most {longest} frames from keyframe to keyframe \
+             (schedule.lengths.max)",
+            model.name()
+        );
+        let lengths = self.lengths.iter().copied();
+        let (answered, others): (Vec<usize>, Vec<usize>) =
+            lengths.partition(|&length| self.set.span(length) <= longest);
+        match answered.is_empty() {
+            true => Err(bad(format!("{why}; give smaller --lengths"))),
+            false => {
+                let left_out = |length: usize| format!("N = {length} is left out: {why}");
+                Ok((answered, others.into_iter().map(left_out).collect()))
+            }
+        }
     }
 
     /// Asks a model about windows of a length and measures each answer.
@@ -230,6 +260,7 @@ impl Protocol for InBetweening {
         for &length in &self.lengths {
             self.set.check(length).map_err(bad)?;
         }
+        let (lengths, mut warnings) = self.answered(subject)?;
         let recordings = part.of(data)?;
         check_skeletons(data, &recordings[0].clip)?;
         let clip_frames: Vec<usize> = recordings.iter().map(Recording::frames).collect();
@@ -244,8 +275,8 @@ impl Protocol for InBetweening {
         }
         let clips = self.recorded(recordings, subject)?;
         let deviations = self.deviations(data)?;
-        let (mut sums, mut warnings) = (Vec::new(), Vec::new());
-        for &length in &self.lengths {
+        let mut sums = Vec::new();
+        for length in lengths {
             let warning = |clip: usize| {
                 let (name, frames) = (recordings[clip].name(), clip_frames[clip]);
                 left_out(name, frames, needed, length)

@@ -32,6 +32,17 @@ const NOISE: f64 = 0.1;
 const DROPOUT_KEY: u64 = 0x5eed;
 
 impl Pu2022Settings {
+    /// Takes windows of this many frames, as `--frames` asks.
+    ///
+    /// # Errors
+    /// Frames that no window can have.
+    fn set_length(&mut self, frames: usize) -> Result<(), ModelError> {
+        self.window.length = frames;
+        self.check_values().map_err(|error| ModelError::Data {
+            reason: format!("--frames {frames}: {error}"),
+        })
+    }
+
     pub(super) fn build<T: Real, R: Rng>(
         &self,
         init: &mut Initialiser<'_, T, R>,
@@ -176,11 +187,8 @@ impl ModelSettings for Pu2022Settings {
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Box<dyn Task<f32>>, ModelError> {
         let mut settings = self.clone();
-        settings.window.length = frames;
         settings.schedule.batch_size = batch;
-        settings
-            .check_values()
-            .map_err(|error| ModelError::data(&error))?;
+        settings.set_length(frames)?;
         Ok(Box::new(MadeUpTask::new(settings, streams, init)?))
     }
 
@@ -203,10 +211,7 @@ impl ModelSettings for Pu2022Settings {
             false => self.small(),
         };
         if let Some(frames) = options.frames {
-            settings.window.length = frames;
-            settings
-                .check_values()
-                .map_err(|error| ModelError::data(&error))?;
+            settings.set_length(frames)?;
         }
         let case = |masks: bool| {
             let title = format!(
@@ -225,6 +230,15 @@ impl ModelSettings for Pu2022Settings {
         setting: &TaskSetting<'_>,
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
+        options.check_not_fed()?;
+        let length = self.window.length;
+        if let Some(frames) = options.frames.filter(|frames| *frames != length) {
+            let reason = format!(
+                "--frames {frames}: the model's windows have {length} frames (window.length); \
+                 leave it out"
+            );
+            return Err(ModelError::Data { reason }.into());
+        }
         let loaded = self.load(saved)?;
         let windows = self.exported_windows(setting, options)?;
         let (given, truths): (Vec<_>, Vec<_>) = windows.into_iter().unzip();

@@ -6,7 +6,7 @@ use super::settings::{build, loaded};
 use super::{Batch, RotationNetwork, RotationSettings, TrainingClip};
 use crate::autograd::{AutogradError, Parameters, Real, Tape, Workspace};
 use crate::data::WindowCut;
-use crate::models::exported_batch::{ExportOptions, ExportedBatch, spread};
+use crate::models::exported_batch::{ExportOptions, ExportedBatch, FRAMES, spread};
 use crate::models::settings::{LoadError, TaskSetting};
 use crate::models::weights::SavedWeights;
 use crate::models::{ModelError, Streams};
@@ -26,12 +26,14 @@ pub(super) fn export<S: RotationSettings>(
     setting: &TaskSetting<'_>,
     options: &ExportOptions,
 ) -> Result<ExportedBatch, LoadError> {
+    options.check_not_fed()?;
     let model = loaded(settings, saved)?;
-    if !(3..=model.network.longest()).contains(&options.frames) {
+    let longest = model.network.longest();
+    let frames = options.frames.unwrap_or(FRAMES.min(longest));
+    if !(3..=longest).contains(&frames) {
         let reason = format!(
-            "--frames {}: the model's windows have 3 to {} frames (schedule.lengths.max)",
-            options.frames,
-            model.network.longest()
+            "--frames {frames}: the model's windows have 3 to {longest} frames \
+             (schedule.lengths.max)"
         );
         return Err(ModelError::Data { reason }.into());
     }
@@ -41,7 +43,6 @@ pub(super) fn export<S: RotationSettings>(
             .body
             .check(recording.name(), &recording.clip.skeleton)?;
     }
-    let frames = options.frames;
     let cut = WindowCut {
         frames,
         every: 1,
@@ -51,7 +52,7 @@ pub(super) fn export<S: RotationSettings>(
     let mut windows = Vec::new();
     let mut all = cut.windows(&lengths);
     all.retain(|window| window.start >= settings.past());
-    for window in spread(&all, frames, options)? {
+    for window in spread(&all, options.windows, frames, frames)? {
         // As a training labels it.
         let indices = [0, window.clip as u64];
         let clip = TrainingClip::new(

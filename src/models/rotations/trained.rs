@@ -407,6 +407,10 @@ impl Generator for TrainedRotations {
         }
     }
 
+    fn longest_span(&self) -> Option<usize> {
+        Some(self.network.longest())
+    }
+
     fn contact_rule(&self) -> ContactRule {
         self.reference.rule
     }

@@ -4,13 +4,13 @@ use super::training_windows::{features_of, poses_of};
 use super::{Batch, DanceClip, Forcing, RootFrame, TrainedModel, windows};
 use crate::autograd::{Tape, Workspace};
 use crate::models::ModelError;
-use crate::models::exported_batch::{ExportOptions, ExportedBatch, spread};
+use crate::models::exported_batch::{ExportOptions, ExportedBatch, FRAMES, spread};
 
 /// Dropout is off. `window [N + 1, B, 154]`, `outputs [N, B, 149]` (own predictions fed), `loss.*`,
 /// `gradient.*`, `ground_truth_fed [1]`.
 ///
 /// # Errors
-/// No clip is long enough; an operation fails; f64 is asked for.
+/// No clip is long enough; an operation fails; f64 is asked for, or what the model is never fed.
 pub(super) fn export(
     model: &TrainedModel,
     root_frame: RootFrame,
@@ -22,16 +22,19 @@ pub(super) fn export(
             reason: "a model of transitions exports batches in f32 only".into(),
         });
     }
-    let batch = cut(options, clips, model, root_frame)?;
     let (parameters, network) = (model.parameters(), model.network());
-    let mut workspace = Workspace::new();
-    let failed = |error| ModelError::data(&error);
-    let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &batch);
-    let outputs = outputs.map_err(failed)?;
     let forcing = network.forcing(match options.ground_truth {
         true => Forcing::Teacher,
         false => Forcing::FreeRunning,
     });
+    if forcing != Forcing::Teacher {
+        options.check_not_fed()?;
+    }
+    let batch = cut(options, clips, model, root_frame)?;
+    let mut workspace = Workspace::new();
+    let failed = |error| ModelError::data(&error);
+    let outputs = network.predict(&mut Tape::inference(parameters, &mut workspace), &batch);
+    let outputs = outputs.map_err(failed)?;
     let mut exported = ExportedBatch::default();
     let losses = exported.add_losses(parameters, &mut workspace, |tape| {
         network.losses(tape, &batch, forcing)
@@ -53,9 +56,10 @@ fn cut(
     model: &TrainedModel,
     root_frame: RootFrame,
 ) -> Result<Batch<f32>, ModelError> {
-    let frames = options.frames;
+    let frames = options.frames.unwrap_or(FRAMES);
     let lengths: Vec<usize> = clips.iter().map(|clip| clip.frames()).collect();
-    let chosen = spread(&windows(&lengths, frames).windows, frames + 1, options)?;
+    let all = windows(&lengths, frames).windows;
+    let chosen = spread(&all, options.windows, frames, frames + 1)?;
     let shown = (model.standardisation(), root_frame);
     Ok(Batch {
         poses: Some(poses_of(clips, &chosen, frames)),
