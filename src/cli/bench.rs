@@ -1,20 +1,16 @@
 //! `keydance bench-step`, `bench-layers`, `bench-generate`: how fast this machine computes.
 
+use std::fmt::Display;
 use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
-use crate::counted::counted;
 use crate::experiment::ExperimentConfig;
-use crate::models::transition::ModelConfig;
-use crate::models::transition::measure::MeasuredGeneration;
-use crate::nn::measure::{Measured, MeasuredLayers, fastest};
+use crate::models::transition::measure::GenerationSpeed;
+use crate::nn::measure::LayersSpeed;
 use crate::training::measure::step_speed;
-
-/// Frames of the generated transitions.
-const FRAMES: usize = 60;
 
 /// What is timed.
 #[derive(Debug, Args)]
@@ -85,14 +81,12 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
         Some(path) => ExperimentConfig::load(path, &sets)?,
         None => ExperimentConfig::with_sets(&sets)?,
     };
-    let speed = step_speed(
-        &config,
-        args.frames.into(),
-        args.batch.into(),
-        args.threads.into(),
-        args.repetitions.into(),
-    )?;
-    print(args.json, &speed, &speed.to_string())
+    let (frames, batch) = (args.frames.into(), args.batch.into());
+    let (threads, repetitions) = (args.threads.into(), args.repetitions.into());
+    print(
+        args.json,
+        &step_speed(&config, frames, batch, threads, repetitions)?,
+    )
 }
 
 /// Times forward and backward of the model's layers by themselves.
@@ -100,54 +94,25 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
 /// # Errors
 /// No threads to be had.
 pub fn layers(args: LayersArgs) -> anyhow::Result<()> {
-    let threads = args.threads;
-    let milliseconds = |measured| -> anyhow::Result<f64> {
-        let mut layers = MeasuredLayers::new(measured, threads.into())?;
-        Ok(1e3 * fastest(args.repetitions.into(), || layers.run())?)
-    };
-    let lstm = milliseconds(Measured::Lstm)?;
-    let encoder = milliseconds(Measured::EncoderLayers)?;
-    let result = serde_json::json!({
-        "threads": threads,
-        "lstm_ms": lstm,
-        "encoder_layers_ms": encoder,
-    });
-    let text = format!(
-        "{}: LSTM 1024 -> 256 and linear, 128 x 30: {lstm:.1} ms; two encoder \
-         layers, 128 windows of 7: {encoder:.1} ms",
-        counted(threads, "thread")
-    );
-    print(args.json, &result, &text)
+    let speed = LayersSpeed::measure(args.threads.into(), args.repetitions.into())?;
+    print(args.json, &speed)
 }
 
-/// Times the generation of transitions of 60 frames by the paper's whole model, without a tape that
-/// records.
+/// Times the generation of transitions by the paper's whole model, without a tape that records.
 ///
 /// # Errors
 /// No threads to be had.
 pub fn generate(args: GenerateArgs) -> anyhow::Result<()> {
-    let (batch, threads) = (usize::from(args.batch), usize::from(args.threads));
-    let mut generation = MeasuredGeneration::new(&ModelConfig::default(), FRAMES, batch, threads)?;
-    let seconds = fastest(args.repetitions.into(), || generation.run())?;
-    let ms_per_frame = seconds * 1e3 / FRAMES as f64;
-    let frames_per_second = (FRAMES * batch) as f64 / seconds;
-    let result = serde_json::json!({
-        "batch": batch,
-        "threads": threads,
-        "ms_per_frame": ms_per_frame,
-        "frames_per_second": frames_per_second,
-    });
-    let text = format!(
-        "generation, {batch} at once, {}: {ms_per_frame:.2} ms a frame, \
-         {frames_per_second:.0} frames/s",
-        counted(threads, "thread")
-    );
-    print(args.json, &result, &text)
+    let (batch, threads) = (args.batch.into(), args.threads.into());
+    let speed = GenerationSpeed::measure(batch, threads, args.repetitions.into())?;
+    print(args.json, &speed)
 }
 
-/// Prints a result as a line of JSON or as text.
-fn print(json: bool, result: &impl Serialize, text: &str) -> anyhow::Result<()> {
-    let json = json.then(|| serde_json::to_string(result)).transpose()?;
-    writeln!(std::io::stdout(), "{}", json.as_deref().unwrap_or(text))?;
-    Ok(())
+/// Prints a speed as a line of JSON or as text.
+fn print(json: bool, speed: &(impl Serialize + Display)) -> anyhow::Result<()> {
+    let line = match json {
+        true => serde_json::to_string(speed)?,
+        false => speed.to_string(),
+    };
+    Ok(writeln!(std::io::stdout(), "{line}")?)
 }

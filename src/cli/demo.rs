@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::notice;
@@ -15,15 +14,10 @@ use super::progress::Progress;
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::counted::counted;
-use crate::data::{DataPart, Dataset};
-use crate::evaluation::{ProtocolScores, Tables};
-use crate::experiment::ExperimentConfig;
+use crate::data::DataPart;
 use crate::models::Generator;
-use crate::models::baselines::interpolation::Interpolation;
-use crate::models::transition::DanceClip;
-use crate::report::demo::{self, Comparison, DemoSettings, Losses, Showcase};
+use crate::report::demo::{Demo, DemoSettings, Losses};
 use crate::report::thousands;
-use crate::run::RunFolder;
 use crate::training::Trainer;
 
 /// Exit code of a demo whose model is behind interpolation or behind itself before its training.
@@ -55,55 +49,19 @@ pub struct DemoArgs {
 /// The folder holds something else, or a file cannot be written.
 pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let begun = Instant::now();
-    let settings = DemoSettings::new(args.reduced, args.fraction)?;
-    let config = &settings.experiment;
+    let demo = Demo::begin(&args.out, DemoSettings::new(args.reduced, args.fraction)?)?;
     let mut out = std::io::stdout();
-    demo::check_folder(&args.out)?;
-    let run = RunFolder::replace(&args.out, config)?;
-    demo::begin_results(run.path(), &settings)?;
-
-    let dataset = settings.dataset()?;
-    writeln!(out, "{}", settings.summary(&dataset))?;
-    let (untrained, losses) = train(config, &dataset, args.threads.count(), &run)?;
-    demo::write_losses(run.path(), &losses)?;
-
-    let model = run.trained_model(config)?;
-    let interpolation = Interpolation {
-        contact_threshold: config.data.contact_threshold,
-    };
-    let pool = args.threads.pool()?;
-    // The paper's numbers are of other data, so its own way of counting adds nothing here.
-    let protocols = &config.protocols()[..1];
-    let protocol = &*protocols[0];
-    let evaluate = |model: &dyn Generator| {
-        let part = DataPart::Test;
-        pool.install(|| evaluate_watched(protocol, model, &dataset, part, true, None))
-            .map(|evaluated| ProtocolScores::new([(protocol.name(), evaluated.scores)]))
-    };
-    let comparison = Comparison {
-        interpolation: evaluate(&interpolation)?,
-        untrained: evaluate(&*untrained)?,
-        model: evaluate(&*model)?,
-    };
-    let manifest = run.manifest()?.context("the training left no manifest")?;
-    let rows = comparison.rows(config, &manifest);
-    let printed = &config.printed()?;
-    let tables = Tables { protocols, printed };
-    write!(out, "\n{}\n", tables.terminal(&rows))?;
-    demo::write_scores(run.path(), &settings, &dataset, &comparison, tables, &rows)?;
-
-    let clips = DanceClip::measure_all(&dataset.test, &config.data.features())?;
-    let showcase = Showcase::new(&clips)?;
-    let motion = showcase.write(&interpolation, &*model, run.path())?;
-    writeln!(
-        out,
-        "{}: {showcase}; its rotations meet the predicted positions to {:.1} cm in the mean, {:.1} cm at most",
-        demo::TRANSITION,
-        motion.mean_error,
-        motion.max_error
-    )?;
+    writeln!(out, "{demo}")?;
+    let untrained = train(&demo, args.threads.count())?;
+    let (model, pool) = (demo.model()?, args.threads.pool()?);
+    let (comparison, tables) = demo.compare(&*untrained, &*model, |protocol, model| {
+        let (dataset, part) = (&demo.dataset, DataPart::Test);
+        pool.install(|| evaluate_watched(protocol, model, dataset, part, true, None))
+    })?;
+    write!(out, "\n{tables}\n")?;
+    writeln!(out, "{}", demo.show(&*model)?)?;
     let seconds = begun.elapsed().as_secs_f64();
-    writeln!(out, "{} in {seconds:.0} s", run.path().display())?;
+    writeln!(out, "{} in {seconds:.0} s", args.out.display())?;
     writeln!(out, "{comparison}")?;
     if comparison.is_ahead() {
         return Ok(ExitCode::SUCCESS);
@@ -116,14 +74,9 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Trains to the end of the schedule and shows the progress on stderr. The model with its initial
-/// weights, and the losses.
-fn train(
-    config: &ExperimentConfig,
-    dataset: &Dataset,
-    threads: usize,
-    run: &RunFolder,
-) -> anyhow::Result<(Box<dyn Generator>, Losses)> {
-    let mut trainer = Trainer::new(config.clone(), dataset, threads)?;
+/// weights.
+fn train(demo: &Demo, threads: usize) -> anyhow::Result<Box<dyn Generator>> {
+    let mut trainer = Trainer::new(demo.config().clone(), &demo.dataset, threads)?;
     writeln!(
         std::io::stdout(),
         "a whole model with {} weights; {}, {} frame-steps on {}",
@@ -135,12 +88,13 @@ fn train(
     let untrained = trainer.model();
     let mut progress = Progress::new(String::new(), trainer.task(), 0);
     let mut losses = Losses::default();
-    let outcome = trainer.run(Some(run), &mut |report| {
+    let outcome = trainer.run(Some(&demo.run), &mut |report| {
         progress.step(report);
         losses.add(report);
         ControlFlow::Continue(())
     });
     drop(progress);
     outcome?;
-    Ok((untrained, losses))
+    demo.write_losses(&losses)?;
+    Ok(untrained)
 }

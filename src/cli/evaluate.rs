@@ -8,18 +8,14 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::clip_choice::ClipChoice;
 use super::list::{name, within};
 use super::notice::warn;
 use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
-use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::protocol::choose;
-use crate::evaluation::{
-    EvaluatedData, EvaluationOptions, EvaluationRecord, ProtocolScores, TableRow, Tables,
-};
+use crate::evaluation::EvaluationOptions;
+use crate::experiment::{Scoring, ScoringChoice};
 use crate::run::{Subject, check_outputs_beside};
 
 #[derive(Debug, Args)]
@@ -32,7 +28,7 @@ pub struct EvaluateArgs {
     data: PathBuf,
     /// Which clips to score on
     #[arg(long, value_enum, default_value_t)]
-    clips: ClipChoice,
+    clips: DataPart,
     /// Transition lengths N to score at, frames, instead of the protocol's own, such as 10, 50, 100
     /// and 150; AVG is the mean over these
     #[arg(long, value_name = "N,N", value_delimiter = ',', allow_hyphen_values = true,
@@ -81,68 +77,39 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     if !args.other_data {
         subject.check_data(&dataset, &args.data)?;
     }
-    let mut out = std::io::stdout();
-    let part = DataPart::from(args.clips);
-    let mut data = EvaluatedData::of(&dataset, part)?;
-    let folder = subject.scores_folder(args.out.as_deref(), &data, args.force)?;
-    if subject.run.is_some() && folder.is_none() {
-        warn(["the run keeps its scores on other clips; --force replaces them"]);
-    }
-    let clips = counted(data.clips, &format!("{} clip", data.part));
-    writeln!(out, "{} on {clips}, {} frames\n", subject.what, data.frames)?;
-    let config = &subject.config;
-    let lengths = BTreeSet::from_iter(args.lengths.iter().map(|&length| length.into()));
-    let options = EvaluationOptions {
-        lengths: lengths.into_iter().collect(),
-        most_windows: args.windows.map(|most| most as usize),
+    let lengths = BTreeSet::from_iter(args.lengths.into_iter().map(usize::from));
+    let choice = ScoringChoice {
+        part: args.clips,
+        options: EvaluationOptions {
+            lengths: lengths.into_iter().collect(),
+            most_windows: args.windows.map(|most| most as usize),
+        },
+        protocols: args.protocol,
+        out: args.out,
+        force: args.force,
     };
-    let protocols = config.protocols_with(&options);
-    let protocols = choose(protocols, &args.protocol, !args.lengths.is_empty())?;
+    let scoring = Scoring::new(&subject, &dataset, &choice)?;
+    warn(scoring.warning());
+    let mut out = std::io::stdout();
+    writeln!(out, "{}\n", scoring.title())?;
     let farewell = format!(
         "stopped, nothing is written; begin again with\n  {}",
         command()
     );
     let (pool, stop) = (args.threads.pool()?, Stop::on_signal(farewell)?);
-    let model = &*subject.model;
-    let mut scores = Vec::new();
-    for protocol in &protocols {
-        let evaluation = match pool
-            .install(|| evaluate_watched(&**protocol, model, &dataset, part, true, Some(&stop)))
-        {
-            Err(error) if error.is_stopped() => {
-                return Ok(interrupted(&stop.farewell));
-            }
-            evaluation => evaluation?,
-        };
+    let (model, part) = (&*subject.model, args.clips);
+    let evaluated = scoring.record(|protocol| {
+        let watched = || evaluate_watched(protocol, model, &dataset, part, true, Some(&stop));
+        let evaluation = pool.install(watched)?;
         warn(&evaluation.warnings);
-        scores.push((protocol.name(), evaluation.scores));
-    }
-    let scores = ProtocolScores::new(scores);
-    let row = TableRow {
-        name: config.name.clone(),
-        seed: None,
-        scores: Some(scores.clone()),
-        schedule_note: String::new(),
+        Ok(evaluation.scores)
+    });
+    let record = match evaluated {
+        Err(error) if error.is_stopped() => return Ok(interrupted(&stop.farewell)),
+        evaluated => evaluated?,
     };
-    let (protocols, printed) = (&protocols, &config.printed()?);
-    write!(out, "{}", Tables { protocols, printed }.terminal(&[row]))?;
-    if let Some(most) = args.windows {
-        writeln!(
-            out,
-            "\nat most {most} windows of each length: not comparable with scores on all"
-        )?;
-    }
-    let bound = options.most_windows;
-    data.most_windows = bound.filter(|&most| scores.most_windows() >= most);
-    let record = EvaluationRecord { scores, data };
-    let all = args.lengths.is_empty() && args.windows.is_none() && args.protocol.is_empty();
-    let of_its_own = match &subject.run {
-        Some(run) => all && *run.config()?.model == *subject.config.model,
-        None => true,
-    };
-    if let Some(folder) = folder.filter(|_| of_its_own) {
-        subject.write_scores(folder, &record)?;
-    }
+    write!(out, "{}", scoring.terminal(&record)?)?;
+    scoring.keep(&record)?;
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }

@@ -8,7 +8,6 @@ use clap::Args;
 use super::notice::warn;
 use crate::data::Dataset;
 use crate::models::exported_batch::ExportOptions;
-use crate::models::{Streams, TaskSetting};
 use crate::run::{RunFolder, check_outputs, replace_file};
 
 #[derive(Debug, Args)]
@@ -48,18 +47,12 @@ pub fn run(args: ExportBatchArgs) -> anyhow::Result<()> {
     let config = run.config()?;
     let dataset = Dataset::load(&args.data, &config.data)?;
     warn(&dataset.warnings);
-    let setting = TaskSetting {
-        dataset: &dataset,
-        data: config.data.clone(),
-        streams: Streams::new(config.seed),
-    };
     let options = ExportOptions {
         frames: args.frames.map(usize::from),
         windows: args.windows.into(),
         ground_truth: args.ground_truth,
         double: args.f64,
     };
-    let saved = run.saved_weights(&config)?;
-    let batch = config.model.export_batch(&saved, &setting, &options)?;
+    let batch = run.export_batch(&config, &dataset, &options)?;
     Ok(replace_file(&args.out, batch.to_safetensors()?)?)
 }

@@ -4,14 +4,12 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::notice::warn;
 use super::threads::Threads;
-use crate::counted::counted;
 use crate::data::Dataset;
-use crate::report::figures::FigureRequest;
+use crate::report::figures::{FigureRequest, drawing_of};
 use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
 /// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al.
@@ -65,27 +63,18 @@ pub struct FiguresArgs {
 /// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &[])?;
-    let compared: Vec<Subject> = args
-        .compare
-        .iter()
-        .map(|path| Subject::open(path, &[]))
-        .collect::<Result<_, _>>()?;
-    let models = compared.iter().chain([&subject]);
-    let inputs: Vec<PathBuf> = models.flat_map(Subject::files).collect();
+    let compared = args.compare.iter().map(|path| Subject::open(path, &[]));
+    let compared = compared.collect::<Result<Vec<_>, _>>()?;
+    let models = || compared.iter().chain([&subject]);
+    let inputs: Vec<PathBuf> = models().flat_map(Subject::files).collect();
     let inputs = inputs.iter().chain([&args.data]);
     check_outputs_beside(Some(&args.out), &args.viewer, inputs, args.force)?;
     check_output_folder(&args.out, args.force)?;
-    let paper = subject.config.paper();
-    let paper = paper.context("the model is not in the registry")?;
-    let draw = paper
-        .figures
-        .with_context(|| format!("{} has no figures that could be drawn", paper.name))?;
+    let draw = drawing_of(&subject)?;
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
     warn(&dataset.warnings);
     if !args.other_data {
-        for model in compared.iter().chain([&subject]) {
-            model.check_data(&dataset, &args.data)?;
-        }
+        models().try_for_each(|model| model.check_data(&dataset, &args.data))?;
     }
     let asked = FigureRequest {
         subject: &subject,
@@ -97,13 +86,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         page: args.viewer.is_some(),
     };
     let drawn = args.threads.pool()?.install(|| draw(&asked))?;
-    let about = format!(
-        "{} on {} of the data with digest {}.",
-        subject.what,
-        counted(dataset.test.len(), "test clip"),
-        dataset.digest
-    );
-    drawn.write(&args.out, &about)?;
+    drawn.write(&args.out, &asked)?;
     if let Some((path, page)) = args.viewer.as_ref().zip(drawn.page) {
         replace_file(path, page)?;
     }

@@ -3,7 +3,6 @@
 mod bench;
 mod bvh;
 mod choreography;
-mod clip_choice;
 mod demo;
 mod evaluate;
 mod export_batch;

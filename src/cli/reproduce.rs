@@ -2,10 +2,10 @@
 //! writes tables, figures and a manifest.
 
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{anyhow, bail};
+use anyhow::anyhow;
 use clap::Args;
 
 use super::list::name;
@@ -90,13 +90,9 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         other => other.into(),
     })?;
     let chosen = rows::chosen(&rows, &args.only, &args.configs)?;
-    let runs = match (&args.runs, args.out.file_name()) {
-        (Some(runs), _) => runs.clone(),
-        (None, Some(name)) => Path::new("runs").join(name),
-        (None, None) => bail!(
-            "--out {} has no name for a folder of runs; give --runs",
-            args.out.display()
-        ),
+    let runs = match &args.runs {
+        Some(runs) => runs.clone(),
+        None => rows::runs_folder(&args.out)?,
     };
     let dataset = rows::dataset(&rows, &args.data)?;
     warn(&dataset.warnings);
@@ -156,8 +152,8 @@ impl Observer for Terminal {
         notice(format_args!("error: {}: {error}", row.folder));
     }
 
-    fn training(&self, trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
-        train::describe(trainer, threads)
+    fn training(&self, trainer: &Trainer<'_>) -> io::Result<()> {
+        train::describe(trainer)
     }
 
     fn steps(

@@ -3,11 +3,9 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use crate::report::RunTable;
-use crate::run::RunFolder;
 
 /// List the runs in a folder: state, progress, speed, scores
 ///
@@ -25,15 +23,6 @@ pub struct RunsArgs {
 /// # Errors
 /// The folder cannot be read, or holds no run. A damaged run is listed as such and is no error.
 pub fn run(args: RunsArgs) -> anyhow::Result<()> {
-    let table = RunTable::of(&args.folder)
-        .with_context(|| format!("the folder {} cannot be read", args.folder.display()))?;
-    if table.is_empty() {
-        anyhow::bail!(
-            "{} holds no run: no folder in it has a {}; `keydance train` makes one",
-            args.folder.display(),
-            RunFolder::CONFIG
-        );
-    }
-    write!(std::io::stdout(), "{table}")?;
+    write!(std::io::stdout(), "{}", RunTable::of(&args.folder)?)?;
     Ok(())
 }

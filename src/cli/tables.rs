@@ -4,10 +4,8 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
-use crate::evaluation::{TableRow, Tables};
 use crate::experiment::EvaluatedRun;
 use crate::run::{RunFolder, check_outputs, replace_file};
 
@@ -31,12 +29,7 @@ pub fn run(args: TablesArgs) -> anyhow::Result<()> {
     let parts = |run: &PathBuf| RunFolder::open(run).parts();
     let inputs: Vec<PathBuf> = args.runs.iter().flat_map(parts).collect();
     check_outputs([&args.out], &inputs, args.force)?;
-    let runs = EvaluatedRun::read_all(&args.runs)?;
-    let rows: Vec<TableRow> = runs.iter().map(EvaluatedRun::row).collect();
-    let first = runs.first().context("no run was given")?;
-    let (protocols, printed) = (&first.config.protocols(), &first.config.printed()?);
-    let text = Tables { protocols, printed }.markdown(&rows, &first.record.data.caption());
-    replace_file(&args.out, text)?;
+    replace_file(&args.out, EvaluatedRun::tables(&args.runs)?)?;
     writeln!(std::io::stdout(), "{}", args.out.display())?;
     Ok(())
 }

@@ -9,11 +9,10 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::HumanDuration;
 
-use super::notice::{notice, warn};
+use super::notice::warn;
 use super::progress::Progress;
 use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
-use crate::counted::counted;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::run::RunFolder;
@@ -50,8 +49,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let mut out = io::stdout();
     let dataset = Dataset::load(&args.data, &config.data)?;
     warn(&dataset.warnings);
-    let threads = args.threads.count();
-    let mut trainer = Trainer::new(config.clone(), &dataset, threads)?;
+    let mut trainer = Trainer::new(config.clone(), &dataset, args.threads.count())?;
     let (run, resumed) = if args.resume {
         let run = RunFolder::resume(&args.out, &config)?;
         let resumed = trainer.resume(&run)?;
@@ -59,7 +57,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     } else {
         (RunFolder::create(&args.out, &config)?, None)
     };
-    describe(&trainer, threads)?;
+    describe(&trainer)?;
     if let Some(expected) = trainer.expected() {
         let expected = HumanDuration(expected.max(Duration::from_secs(1)));
         writeln!(out, "takes about {expected}, as busy as the machine is now")?;
@@ -101,19 +99,9 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
-    let task = trainer.task();
-    let summary = task.summary().map(|summary| format!("{summary}, "));
-    writeln!(
-        io::stdout(),
-        "{} parameters; {}{}, {} frame-steps; {}",
-        trainer.parameters().weights(),
-        summary.unwrap_or_default(),
-        counted(task.steps(), "step"),
-        task.frame_steps(),
-        counted(threads, "thread")
-    )?;
-    warn(task.warnings());
+pub fn describe(trainer: &Trainer<'_>) -> io::Result<()> {
+    writeln!(io::stdout(), "{}", trainer.summary())?;
+    warn(trainer.task().warnings());
     Ok(())
 }
 
@@ -123,14 +111,7 @@ pub fn describe(trainer: &Trainer<'_>, threads: usize) -> io::Result<()> {
 /// # Errors
 /// The output cannot be written.
 pub fn goes_on(resumed: &Resumed) -> io::Result<()> {
-    for problem in &resumed.damaged {
-        notice(format_args!(
-            "warning: a newer checkpoint is left out: {problem}"
-        ));
-    }
-    if let Some(other_bits) = &resumed.other_bits {
-        notice(format_args!("warning: {other_bits}"));
-    }
+    warn(resumed.warnings());
     match resumed.steps {
         0 => Ok(()),
         steps => writeln!(io::stdout(), "goes on after step {steps}"),

@@ -17,6 +17,8 @@ pub use config::{DataConfig, Split};
 pub use dataset::{DataError, Dataset, NamedFrames, Recording};
 pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};
+#[cfg(feature = "music")]
+pub use pairs::music_beside;
 pub use part::{DataPart, EmptyPart};
 pub use reading::FileReading;
 pub use windows::{Window, WindowCut};

@@ -38,6 +38,21 @@ pub(super) fn sound_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Da
     Ok(files)
 }
 
+/// The sound file of a dance's name beside it, or in the folder of sounds beside its own.
+pub fn music_beside(dance: &Path) -> Option<PathBuf> {
+    let (folder, stem) = (dance.parent()?, dance.file_stem()?);
+    let folders = [folder.to_path_buf(), folder.join("..").join(SOUNDS)];
+    let files = folders.iter().flat_map(|folder| {
+        ENDINGS.iter().map(move |ending| {
+            let mut name = stem.to_os_string();
+            name.push(".");
+            name.push(ending);
+            folder.join(name)
+        })
+    });
+    files.into_iter().find(|file| file.is_file())
+}
+
 /// What is heard in the sound file of a dance; `None` where there is none of its name.
 pub(super) fn sound_of<'f>(
     dance: &str,

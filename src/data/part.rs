@@ -9,6 +9,7 @@ use super::{Dataset, Recording};
 /// A part of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum DataPart {
     /// The clips that results are reported on; nothing is chosen by them.
     #[default]

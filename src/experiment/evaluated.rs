@@ -5,25 +5,36 @@ use std::path::{Path, PathBuf};
 
 use super::{ExperimentConfig, ReproduceError};
 use crate::counted::counted;
-use crate::evaluation::{EvaluationRecord, TableRow};
+use crate::evaluation::{EvaluationRecord, TableRow, Tables};
 use crate::report::{NO_TRAINING, schedule_note};
 use crate::run::{Manifest, RunFolder};
 
 /// A run with its scores.
 pub struct EvaluatedRun {
     folder: PathBuf,
-    pub config: ExperimentConfig,
+    config: ExperimentConfig,
     /// None where nothing was trained.
     manifest: Option<Manifest>,
-    pub record: EvaluationRecord,
+    record: EvaluationRecord,
 }
 
 impl EvaluatedRun {
-    /// The runs of folders that were evaluated on the same clips.
+    /// The tables of the runs of folders, Markdown, beside what the first one's paper prints.
     ///
     /// # Errors
-    /// A folder has no scores, a file of it is damaged, or the scores are of different data.
-    pub fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, ReproduceError> {
+    /// A folder has no scores, a file of it is damaged, or the scores are of different data; there
+    /// are no folders.
+    pub fn tables(folders: &[PathBuf]) -> Result<String, ReproduceError> {
+        let runs = Self::read_all(folders)?;
+        let rows: Vec<TableRow> = runs.iter().map(Self::row).collect();
+        let none = || ReproduceError::Refused("no run was given".into());
+        let Self { config, record, .. } = runs.first().ok_or_else(none)?;
+        let (protocols, printed) = (&config.protocols(), &config.printed()?);
+        Ok(Tables { protocols, printed }.markdown(&rows, &record.data.caption()))
+    }
+
+    /// The runs of folders that were evaluated on the same clips.
+    fn read_all(folders: &[PathBuf]) -> Result<Vec<Self>, ReproduceError> {
         let runs = folders.iter().map(|folder| Self::read(folder));
         let runs: Vec<Self> = runs.collect::<Result<_, _>>()?;
         for pair in runs.windows(2) {
@@ -52,7 +63,7 @@ impl EvaluatedRun {
     }
 
     /// Its row in the tables.
-    pub fn row(&self) -> TableRow {
+    fn row(&self) -> TableRow {
         TableRow {
             name: self.config.name.clone(),
             seed: self.manifest.as_ref().map(|manifest| manifest.seed),

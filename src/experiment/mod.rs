@@ -8,6 +8,7 @@ mod report;
 mod reproduce;
 mod results;
 pub mod rows;
+mod scoring;
 
 pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
 pub use error::ReproduceError;
@@ -15,3 +16,4 @@ pub use evaluated::EvaluatedRun;
 pub use layers::ConfigError;
 pub use reproduce::{Ending, Observer, Reproduction, StepObserver};
 pub use rows::{Row, Seeds};
+pub use scoring::{Scoring, ScoringChoice};

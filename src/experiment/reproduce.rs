@@ -34,7 +34,7 @@ pub trait Observer: Sync {
     fn diverged(&self, row: &Row, error: &TrainingError);
 
     /// A training is about to begin or to go on.
-    fn training(&self, trainer: &Trainer<'_>, threads: usize) -> io::Result<()>;
+    fn training(&self, trainer: &Trainer<'_>) -> io::Result<()>;
 
     /// A training goes on after what `resumed` says; the result is told each of its steps.
     fn steps(
@@ -236,7 +236,7 @@ impl Reproduction<'_> {
 
     fn train(&self, row: &Row) -> Result<Outcome, ReproduceError> {
         let mut trainer = Trainer::new(row.config.clone(), self.dataset, self.threads)?;
-        self.observer.training(&trainer, self.threads)?;
+        self.observer.training(&trainer)?;
         let run = RunFolder::resume(&self.runs.join(&row.folder), &row.config)?;
         let resumed = trainer.resume(&run)?;
         let mut step = self.observer.steps(row, &trainer, &resumed)?;

@@ -148,6 +148,20 @@ pub fn chosen<'r>(
     Ok(rows.iter().filter(is_chosen).collect())
 }
 
+/// The folder for the runs where none is named: `runs/` and the name of the results' folder.
+///
+/// # Errors
+/// That has no name.
+pub fn runs_folder(out: &Path) -> Result<PathBuf, ReproduceError> {
+    let name = out.file_name().ok_or_else(|| {
+        let out = out.display();
+        ReproduceError::Refused(format!(
+            "--out {out} has no name for a folder of runs; give --runs"
+        ))
+    })?;
+    Ok(Path::new("runs").join(name))
+}
+
 /// The data set of all rows.
 ///
 /// # Errors

@@ -43,6 +43,7 @@ pub mod peaks;
 mod resample;
 pub mod sound;
 pub mod spectrum;
+mod summary;
 pub mod tempo;
 
 pub use analysis::Analysis;
@@ -51,3 +52,4 @@ pub use decode::{parse, read};
 pub use error::MusicError;
 pub use features::FeatureSet;
 pub use sound::{FRAME_RATE, HOP, RATE, Sound};
+pub use summary::Summary;

@@ -1,14 +1,17 @@
 //! How fast two layers of the model are by themselves: forward, a sum of squares, backward, on
 //! made-up inputs.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use ndarray::{ArrayD, IxDyn};
 use rand::{Rng, RngExt, SeedableRng};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::{Initialiser, Linear, Lstm, TransformerEncoderLayer, TransformerSizes};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Var, Workspace};
+use crate::counted::counted;
 
 /// Sequences or windows in a batch.
 const BATCH: usize = 128;
@@ -50,6 +53,45 @@ pub enum MeasureError {
     Threads(#[from] rayon::ThreadPoolBuildError),
     #[error(transparent)]
     Layers(#[from] AutogradError),
+}
+
+/// Speed of the layers, forward and backward: the fastest of the timed steps, ms.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LayersSpeed {
+    pub threads: usize,
+    pub lstm_ms: f64,
+    pub encoder_layers_ms: f64,
+}
+
+impl LayersSpeed {
+    /// Times `repetitions` steps of either after one to warm up.
+    ///
+    /// # Errors
+    /// As [`MeasuredLayers::new`].
+    pub fn measure(threads: usize, repetitions: usize) -> Result<Self, MeasureError> {
+        let milliseconds = |measured| -> Result<f64, MeasureError> {
+            let mut layers = MeasuredLayers::new(measured, threads)?;
+            Ok(1e3 * fastest(repetitions, || layers.run())?)
+        };
+        Ok(Self {
+            threads,
+            lstm_ms: milliseconds(Measured::Lstm)?,
+            encoder_layers_ms: milliseconds(Measured::EncoderLayers)?,
+        })
+    }
+}
+
+impl fmt::Display for LayersSpeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: LSTM 1024 -> 256 and linear, 128 x 30: {:.1} ms; two encoder layers, 128 windows \
+             of 7: {:.1} ms",
+            counted(self.threads, "thread"),
+            self.lstm_ms,
+            self.encoder_layers_ms
+        )
+    }
 }
 
 enum Layers {

@@ -2,6 +2,7 @@
 
 use crate::data::choreography::ChoreographyError;
 use crate::data::{DataError, EmptyPart};
+use crate::evaluation::{EvaluationError, PrintedError};
 use crate::experiment::ConfigError;
 use crate::models::ModelError;
 use crate::models::settings::ValueError;
@@ -73,6 +74,10 @@ pub enum ReportError {
     Data(#[from] DataError),
     #[error(transparent)]
     EmptyPart(#[from] EmptyPart),
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
+    #[error(transparent)]
+    Printed(#[from] PrintedError),
     #[error(transparent)]
     Config(#[from] ConfigError),
     #[error(transparent)]

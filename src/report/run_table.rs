@@ -46,10 +46,20 @@ impl RunTable {
     /// Reads the runs of a folder. A damaged run has a row that says so.
     ///
     /// # Errors
-    /// The folder cannot be read.
-    pub fn of(folder: &Path) -> std::io::Result<Self> {
+    /// The folder cannot be read, or holds no run.
+    pub fn of(folder: &Path) -> Result<Self, RunError> {
         let mut folders = Vec::new();
-        find(folder, DEEPEST, &mut folders)?;
+        let refused = |problem| Err(RunError::Refused(problem));
+        let name_of_it = folder.display();
+        if let Err(cause) = find(folder, DEEPEST, &mut folders) {
+            return refused(format!("the folder {name_of_it} cannot be read: {cause}"));
+        }
+        if folders.is_empty() {
+            return refused(format!(
+                "{name_of_it} holds no run: no folder in it has a {}; `keydance train` makes one",
+                RunFolder::CONFIG
+            ));
+        }
         folders.sort_unstable();
         let rows = folders
             .iter()
@@ -57,11 +67,6 @@ impl RunTable {
         Ok(Self {
             rows: rows.collect(),
         })
-    }
-
-    /// Whether there is no run.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
     }
 }
 

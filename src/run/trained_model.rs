@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use super::checkpoint::{self, WEIGHTS_FILE};
 use super::error::RunError;
 use super::folder::RunFolder;
+use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
-use crate::models::Generator;
+use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::weights::SavedWeights;
+use crate::models::{Generator, Streams, TaskSetting};
 
 impl RunFolder {
     /// The newest weights of the run: those of its end, before it those of the newest checkpoint.
@@ -49,6 +51,25 @@ impl RunFolder {
     pub fn saved_weights(&self, config: &ExperimentConfig) -> Result<SavedWeights, RunError> {
         self.read_weights(config)
             .map_err(|error| self.or_other_version(error))
+    }
+
+    /// Training windows with what the run's newest weights make of them.
+    ///
+    /// # Errors
+    /// As [`RunFolder::saved_weights`]; there are no such windows.
+    pub fn export_batch(
+        &self,
+        config: &ExperimentConfig,
+        dataset: &Dataset,
+        options: &ExportOptions,
+    ) -> Result<ExportedBatch, RunError> {
+        let saved = self.saved_weights(config)?;
+        let setting = TaskSetting {
+            dataset,
+            data: config.data.clone(),
+            streams: Streams::new(config.seed),
+        };
+        Ok(config.model.export_batch(&saved, &setting, options)?)
     }
 
     /// The run's config, which says how its newest weights, if there are any, were trained.

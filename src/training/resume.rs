@@ -19,6 +19,15 @@ pub struct Resumed {
     pub other_bits: Option<String>,
 }
 
+impl Resumed {
+    /// What is to be known of going on there.
+    pub fn warnings(&self) -> Vec<String> {
+        let damaged = self.damaged.iter();
+        let left_out = damaged.map(|why| format!("a newer checkpoint is left out: {why}"));
+        left_out.chain(self.other_bits.clone()).collect()
+    }
+}
+
 impl Trainer<'_> {
     /// Takes up the newest whole checkpoint of a run; the damaged ones after it are set aside.
     /// Without any checkpoint the training is at its beginning.

@@ -9,6 +9,7 @@ use super::report::StepReport;
 use super::step::{StepInput, Stepper};
 use super::validation::Validation;
 use crate::autograd::Parameters;
+use crate::counted::counted;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::models::settings::{InitialRng, TaskSetting};
@@ -112,6 +113,19 @@ impl<'d> Trainer<'d> {
 
     pub fn parameters(&self) -> &Parameters<f32> {
         &self.parameters
+    }
+
+    /// How large it is.
+    pub fn summary(&self) -> String {
+        let own = self.task.summary().map(|summary| format!("{summary}, "));
+        format!(
+            "{} parameters; {}{}, {} frame-steps; {}",
+            self.parameters.weights(),
+            own.unwrap_or_default(),
+            counted(self.task.steps(), "step"),
+            self.task.frame_steps(),
+            counted(self.threads, "thread")
+        )
     }
 
     /// Steps done.

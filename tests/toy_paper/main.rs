@@ -163,7 +163,7 @@ impl Observer for Silent {
 
     fn diverged(&self, _row: &Row, _error: &TrainingError) {}
 
-    fn training(&self, _trainer: &Trainer<'_>, _threads: usize) -> io::Result<()> {
+    fn training(&self, _trainer: &Trainer<'_>) -> io::Result<()> {
         Ok(())
     }
 

@@ -12,6 +12,8 @@ mod curve;
 mod feet;
 mod figures;
 #[cfg(feature = "music")]
+mod files;
+#[cfg(feature = "music")]
 mod music;
 mod pelvis;
 mod rhythm;
@@ -28,7 +30,9 @@ use thiserror::Error;
 
 use crate::motion::Clip;
 #[cfg(feature = "music")]
-pub use music::{DanceWithMusic, generate_with_music};
+pub use files::{DanceFileError, write_clips};
+#[cfg(feature = "music")]
+pub use music::{DanceWithMusic, clips_with_music, generate_with_music};
 
 use feet::{Foot, FootPose};
 use figures::Family;
@@ -39,7 +43,7 @@ use style::Style;
 /// Frames that a clip may have: two, so that there is a velocity, to about nine hours.
 pub const FRAMES: RangeInclusive<usize> = 2..=1_000_000;
 
-/// How many clips may be asked for, each held in memory until all are made.
+/// How many clips may be asked for: they may be held in memory until all are made.
 pub const CLIPS: RangeInclusive<usize> = 1..=1000;
 
 /// Distance (cm) from the middle of the floor at which a dancer turns back.

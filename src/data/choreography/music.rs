@@ -46,15 +46,19 @@ pub struct DanceWithMusic {
 pub fn generate_with_music(
     config: &ChoreographyConfig,
 ) -> Result<Vec<DanceWithMusic>, ChoreographyError> {
+    Ok(clips_with_music(config)?.collect())
+}
+
+/// The same one after the other, for more of them than memory holds.
+///
+/// # Errors
+/// As [`super::generate`].
+pub fn clips_with_music(
+    config: &ChoreographyConfig,
+) -> Result<impl Iterator<Item = DanceWithMusic> + use<>, ChoreographyError> {
     check(config)?;
-    let ChoreographyConfig {
-        clips,
-        frames_per_clip,
-        seed,
-    } = *config;
-    Ok((0..clips)
-        .map(|number| of_number(number, frames_per_clip, seed))
-        .collect())
+    let (frames, seed) = (config.frames_per_clip, config.seed);
+    Ok((0..config.clips).map(move |number| of_number(number, frames, seed)))
 }
 
 fn of_number(number: usize, frames: usize, seed: u64) -> DanceWithMusic {

@@ -1,10 +1,12 @@
 //! How fast a model generates: transitions from made-up keyframes, without a tape that records.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::ModelConfig;
 use super::Standardisation;
@@ -14,6 +16,52 @@ use crate::counted::counted;
 use crate::models::ModelError;
 use crate::motion::features::FEATURES;
 use crate::nn::Initialiser;
+use crate::nn::measure::fastest;
+
+/// Frames of the transitions whose speed is told.
+const FRAMES: usize = 60;
+
+/// Speed of the generation of transitions of 60 frames by the paper's whole model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GenerationSpeed {
+    /// Transitions at once.
+    pub batch: usize,
+    pub threads: usize,
+    /// Of a frame of all of them, the fastest of the timed generations.
+    pub ms_per_frame: f64,
+    pub frames_per_second: f64,
+}
+
+impl GenerationSpeed {
+    /// Times `repetitions` generations after one to warm up.
+    ///
+    /// # Errors
+    /// As [`MeasuredGeneration::new`].
+    pub fn measure(batch: usize, threads: usize, repetitions: usize) -> Result<Self, ModelError> {
+        let config = ModelConfig::default();
+        let mut generation = MeasuredGeneration::new(&config, FRAMES, batch, threads)?;
+        let seconds = fastest(repetitions, || generation.run())?;
+        Ok(Self {
+            batch,
+            threads,
+            ms_per_frame: seconds * 1e3 / FRAMES as f64,
+            frames_per_second: (FRAMES * batch) as f64 / seconds,
+        })
+    }
+}
+
+impl fmt::Display for GenerationSpeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "generation, {} at once, {}: {:.2} ms a frame, {:.0} frames/s",
+            self.batch,
+            counted(self.threads, "thread"),
+            self.ms_per_frame,
+            self.frames_per_second
+        )
+    }
+}
 
 /// A generation that can be timed again and again.
 pub struct MeasuredGeneration {

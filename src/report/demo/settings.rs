@@ -57,6 +57,18 @@ impl DemoSettings {
         )
     }
 
+    /// What the scores are on, for a caption.
+    pub(super) fn subject(&self, dataset: &Dataset) -> String {
+        let choreography = &self.choreography;
+        format!(
+            "{} of {} of {} (seed {})",
+            dataset.test.len(),
+            counted(choreography.clips, "generated clip"),
+            counted(choreography.frames_per_clip, "frame"),
+            choreography.seed
+        )
+    }
+
     /// The generated clips, split as the experiment says.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ pub use numbers::Numbers;
 use std::path::Path;
 
 use super::{MotionFigure, ReportError};
+use crate::counted::counted;
 use crate::data::Dataset;
 use crate::run::{FileError, Subject, replace_file};
 
@@ -43,17 +44,41 @@ pub struct DrawnFigures {
     pub page: Option<String>,
 }
 
+/// What draws the figures of a subject's paper.
+///
+/// # Errors
+/// A model that is not in the registry, or whose paper has no figures that could be drawn.
+pub fn drawing_of(subject: &Subject) -> Result<DrawFigures, ReportError> {
+    let refused = |text: &str| ReportError::Refused(text.into());
+    let paper = subject.config.paper();
+    let paper = paper.ok_or_else(|| refused("the model is not in the registry"))?;
+    let none = || {
+        refused(&format!(
+            "{} has no figures that could be drawn",
+            paper.name
+        ))
+    };
+    paper.figures.ok_or_else(none)
+}
+
 impl DrawnFigures {
-    /// Writes all figures and the page that shows them into a folder, made where there is none.
+    /// Writes all figures and the page that shows them, and says what they are about, into a
+    /// folder, made where there is none.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, folder: &Path, subject: &str) -> Result<(), ReportError> {
+    pub fn write(&self, folder: &Path, about: &FigureRequest<'_>) -> Result<(), ReportError> {
+        let subject = format!(
+            "{} on {} of the data with digest {}.",
+            about.subject.what,
+            counted(about.dataset.test.len(), "test clip"),
+            about.dataset.digest
+        );
         std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
         for figure in &self.figures {
             figure.write(folder)?;
         }
-        let index = index(&self.figures, subject);
+        let index = index(&self.figures, &subject);
         Ok(replace_file(&folder.join("index.md"), index)?)
     }
 }
