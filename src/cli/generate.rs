@@ -2,7 +2,6 @@
 //! them as BVH.
 
 mod keyframes;
-mod rotations;
 mod song;
 mod trajectory;
 mod velocity;
@@ -10,21 +9,15 @@ mod velocity;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::file_units::FileUnits;
 use super::notice::warn;
-use crate::counted::counted;
-use crate::models::generator::{Condition, NeededPoses};
-use crate::models::transition::DataRanges;
 use crate::motion::bvh;
-use crate::report::viewer::generated_page;
+use crate::report::viewer::{check_page, dance_page};
 use crate::run::{Subject, beside_clips, check_outputs, replace_file, write_json};
-use crate::synthesis::keyframes::Keyframes;
-use crate::synthesis::{ControlWarning, Summary, SynthesisOptions, control_warnings, synthesise};
+use crate::synthesis::{ContactSequence, Dance, DanceRequest, SynthesisOptions};
 use keyframes::KeyframeArgs;
-use rotations::ContactArgs;
 use song::SongArgs;
 use trajectory::TrajectoryArgs;
 use velocity::VelocityArgs;
@@ -55,8 +48,13 @@ pub struct GenerateArgs {
     trajectory: TrajectoryArgs,
     #[command(flatten)]
     velocity: VelocityArgs,
-    #[command(flatten)]
-    contacts: ContactArgs,
+    /// Which foot stands when, every frame once, such as left:0-9,right:10-24,both:25-30; where
+    /// both stand one is drawn by --seed [default: the lower foot of --motion]
+    #[arg(long, value_name = "FOOT:FIRST-LAST,..")]
+    contacts: Option<ContactSequence>,
+    /// What is drawn follows from this
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     #[command(flatten)]
     song: SongArgs,
     /// Pin the feet where the model predicts contact
@@ -79,74 +77,56 @@ pub struct GenerateArgs {
     force: bool,
 }
 
+impl GenerateArgs {
+    /// What they ask of a model for data of so many frames a second.
+    fn request(&self, fps: f64) -> DanceRequest {
+        let name = self.out.file_name().unwrap_or_default();
+        DanceRequest {
+            name: name.to_string_lossy().into(),
+            keyframes: self.keyframes.choice(fps),
+            lengths: self.keyframes.length.clone(),
+            trajectory: self.trajectory.controls(),
+            velocity: self.velocity.controls(),
+            contacts: self.contacts.clone(),
+            seed: self.seed,
+            song: self.song.request(fps),
+            options: SynthesisOptions {
+                foot_cleanup: self.foot_cleanup,
+            },
+        }
+    }
+}
+
 /// # Errors
 /// The run, a file or a control cannot be used, or they do not fit each other; nothing is written
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let subject = Subject::open(&args.run, &args.set)?;
     subject.check_features()?;
-    let needs = subject.model.needs();
-    if let NeededPoses::Past(frames) | NeededPoses::Keyframes { past: frames @ 1.. } = needs.poses {
-        let (what, poses) = (&subject.what, counted(frames, "pose"));
-        anyhow::bail!("{what} dances on from {poses}; generate makes motions between keyframes");
-    }
-    let choice = args.keyframes.choice(subject.config.data.fps);
-    let (mut inputs, own) = (choice.files(), subject.files());
+    Dance::check_model(&subject)?;
+    let data = args.units.over(&subject.config.data);
+    let request = args.request(data.fps);
+    let (mut inputs, own) = (request.files(), subject.files());
     inputs.extend(&own);
-    let TrajectoryArgs { trajectory, .. } = &args.trajectory;
-    inputs.extend(trajectory.iter().chain(&args.velocity.velocity_csv));
-    inputs.extend(args.song.files());
-    inputs.extend(args.velocity.velocity_from.iter().map(|from| &from.file));
     let outputs = args.viewer.iter().chain(&args.json).chain([&args.out]);
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
-    if let Some(music) = &args.song.music {
-        return song::run(&args, &subject, music);
+    if args.viewer.is_some() {
+        check_page(&subject, &request, &args.out)?;
     }
-    if let NeededPoses::Seed(frames) = needs.poses {
-        let frames = counted(frames, "frame");
-        anyhow::bail!(
-            "{} goes on from a seed of {frames} to music; give --music SONG and --seed-motion \
-             FILE.bvh",
-            subject.what
-        );
-    }
-    if let NeededPoses::Keyframes { .. } = needs.poses {
-        return rotations::run(&args, &subject);
-    }
-    let data = args.units.over(&subject.config.data);
-    let keyframes = Keyframes::read(&choice, &data)?;
-    warn(keyframes.notices());
-    let request = keyframes.request(&args.keyframes.length)?;
-    let (request, mut warnings) = args.trajectory.apply(request, &keyframes)?;
-    let request = args.velocity.apply(request, &keyframes)?;
-    let run = subject.run.as_ref();
-    let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
-    let ranges = ranges.transpose()?.flatten();
-    let contacts = args.contacts.contacts.as_ref();
-    let contacts = contacts.map(|_| Condition::Contacts);
-    let asked = [args.trajectory.asked(), args.velocity.asked(), contacts];
-    let unread = asked.into_iter().flatten().filter(|&it| !needs.reads(it));
-    warnings.extend(unread.map(ControlWarning::Unread));
-    warnings.extend(control_warnings(&request, ranges.as_ref()));
-    warn(&warnings);
-    let options = SynthesisOptions {
-        foot_cleanup: args.foot_cleanup,
+    let dance = Dance::make(&subject, &request, &data, &mut |notice| warn([notice]))?;
+    let page = match &args.viewer {
+        Some(path) => dance_page(&subject, &dance, &data, args.song.sound(path))?,
+        None => None,
     };
-    let name = args.out.file_name().unwrap_or_default().to_string_lossy();
-    let sequence = synthesise(subject.model.as_ref(), &request, &options, &name)?;
-    let document = keyframes.document(&sequence.clip);
-    let document = document.context("the motion cannot be written")?;
-    let page = || generated_page(&subject, &keyframes, &request, &sequence, &options);
-    let page = args.viewer.as_ref().map(|_| page()).transpose()?;
-    bvh::write(&args.out, &document)?;
+    bvh::write(&args.out, &dance.document)?;
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
         replace_file(path, page)?;
     }
-    let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
+    let summary = &dance.summary;
     if let Some(path) = &args.json {
-        write_json(path, &summary)?;
+        write_json(path, summary)?;
     }
     writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
     Ok(())

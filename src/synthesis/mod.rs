@@ -3,12 +3,13 @@
 //! A [`SequenceRequest`] holds keyframes, root trajectory and velocity factors; the methods of
 //! [`controls`] change them; [`synthesise`] asks a model for one transition after another, fits
 //! joint rotations to what it predicts, bends each transition onto its keyframe and, where asked,
-//! pins the feet.
+//! pins the feet. A [`Dance`] is all of that from files, by whatever model.
 
 mod blend;
 pub mod clip_keyframes;
 mod completion;
 pub mod controls;
+mod dance;
 mod error;
 mod foot_cleanup;
 pub mod keyframes;
@@ -22,6 +23,7 @@ mod summary;
 mod warning;
 
 pub use completion::{Completion, CompletionRequest, CompletionSummary, ContactSequence, complete};
+pub use dance::{Dance, DanceError, DanceRequest, DanceSummary, MadeSequence, Origin};
 pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
 pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};

@@ -1,18 +1,21 @@
 //! New dances to the music of a recorded one, from random key poses of it: what Pu and Shan 2022
 //! call regeneration.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use thiserror::Error;
+
+use super::keyframes::FileKeyframe;
 use super::song::{Seed, Song, SongChoice, SongError};
-use crate::data::DataConfig;
+use crate::data::music_beside;
+use crate::models::Streams;
 use crate::models::pu2022::{Pu2022Settings, draw_keys};
-use crate::models::{Generator, Streams};
 use crate::music::Cache;
-use crate::synthesis::keyframes::FileKeyframe;
+use crate::run::Subject;
 
 /// Key frames of a dance of so many frames: window after window those that a training draws, none
 /// nearer to the one before than it allows.
-pub fn random_key_frames(
+fn random_key_frames(
     settings: &Pu2022Settings,
     frames: usize,
     stream: &mut impl rand::Rng,
@@ -35,50 +38,106 @@ pub fn random_key_frames(
     keys
 }
 
-/// The `number`-th new dance to the music of a recorded one, read and ready to be asked for: it
-/// goes on from the recorded one's beginning. Everything follows from `seed` and `number`.
-///
-/// # Errors
-/// As [`Song::read`]; a recorded dance no longer than the seed.
-pub fn regeneration(
-    settings: &Pu2022Settings,
-    model: &dyn Generator,
-    [clip, music]: [&Path; 2],
-    data: &DataConfig,
-    [seed, number]: [u64; 2],
-    cache: &Cache,
-) -> Result<Song, SongError> {
-    let choice = SongChoice {
-        music: music.into(),
-        seed: Seed::Motion(clip.into(), Some(0)),
-        key_poses: Vec::new(),
-        frames: None,
-        mapping: None,
-    };
-    let short = |found, needed| SongError::ShortDance {
-        clip: clip.into(),
-        found,
-        needed,
-    };
-    let plain = Song::read(&choice, model, data, cache).map_err(|error| match error {
-        SongError::ShortSeed { found, needed, .. } => short(found, needed),
-        other => other,
-    })?;
-    let frames = plain.request.frames.min(plain.seed_clip_frames());
-    if frames <= plain.seed {
-        return Err(short(frames, plain.seed));
+/// Why there are no new dances.
+#[derive(Debug, Error)]
+pub enum RegenerateError {
+    #[error(
+        "{what} is of kind {kind}: key poses are drawn as in the training of a model of kind pu2022"
+    )]
+    OtherKind { what: String, kind: String },
+    #[error("{clip} has no sound file of its name beside it; give --music SONG")]
+    NoMusic { clip: PathBuf },
+    #[error(
+        "new dances in {folder} would stand among the recorded ones; give another folder to --out"
+    )]
+    AmongRecorded { folder: PathBuf },
+}
+
+/// A recorded dance with its music, to which a model makes new ones.
+pub struct Regeneration<'s> {
+    settings: &'s Pu2022Settings,
+    subject: &'s Subject,
+    clip: &'s Path,
+    music: PathBuf,
+    /// What is drawn follows from it.
+    seed: u64,
+    cache: Cache,
+}
+
+impl<'s> Regeneration<'s> {
+    /// New dances in `folder`; without `music`, to the file beside the recorded one.
+    ///
+    /// # Errors
+    /// A model of another kind, a dance without music, the folder of the recorded dance.
+    pub fn new(
+        subject: &'s Subject,
+        clip: &'s Path,
+        music: Option<PathBuf>,
+        folder: &Path,
+        seed: u64,
+    ) -> Result<Self, RegenerateError> {
+        let settings = subject.config.model.downcast_ref::<Pu2022Settings>();
+        let settings = settings.ok_or_else(|| RegenerateError::OtherKind {
+            what: subject.what.clone(),
+            kind: subject.config.model.kind().into(),
+        })?;
+        let no_music = || RegenerateError::NoMusic { clip: clip.into() };
+        let music = music.or_else(|| music_beside(clip)).ok_or_else(no_music)?;
+        let recorded = clip.parent().unwrap_or(Path::new("")).join(".");
+        let recorded = recorded.canonicalize().ok();
+        if recorded.is_some() && recorded == folder.canonicalize().ok() {
+            let folder = folder.into();
+            return Err(RegenerateError::AmongRecorded { folder });
+        }
+        Ok(Self {
+            settings,
+            subject,
+            clip,
+            music,
+            seed,
+            cache: Cache::of_user(),
+        })
     }
-    let mut stream = Streams::new(seed).stream("regeneration", &[number]);
-    let keys = random_key_frames(settings, frames, &mut stream);
-    let key_poses = keys.into_iter().map(|frame| FileKeyframe {
-        file: clip.into(),
-        frame,
-        time: frame,
-    });
-    let choice = SongChoice {
-        key_poses: key_poses.collect(),
-        frames: Some(frames),
-        ..choice
-    };
-    Song::read(&choice, model, data, cache)
+
+    /// The `number`-th new dance, read and ready to be asked for: it goes on from the recorded
+    /// one's beginning. Everything follows from the seed and `number`.
+    ///
+    /// # Errors
+    /// As [`Song::read`]; a recorded dance no longer than the seed.
+    pub fn song(&self, number: u64) -> Result<Song, SongError> {
+        let Subject { model, config, .. } = self.subject;
+        let choice = SongChoice {
+            music: self.music.clone(),
+            seed: Seed::Motion(self.clip.into(), Some(0)),
+            key_poses: Vec::new(),
+            frames: None,
+            mapping: None,
+        };
+        let short = |found, needed| SongError::ShortDance {
+            clip: self.clip.into(),
+            found,
+            needed,
+        };
+        let read = |choice: &SongChoice| Song::read(choice, &**model, &config.data, &self.cache);
+        let plain = read(&choice).map_err(|error| match error {
+            SongError::ShortSeed { found, needed, .. } => short(found, needed),
+            other => other,
+        })?;
+        let frames = plain.request.frames.min(plain.seed_clip_frames());
+        if frames <= plain.seed {
+            return Err(short(frames, plain.seed));
+        }
+        let mut stream = Streams::new(self.seed).stream("regeneration", &[number]);
+        let keys = random_key_frames(self.settings, frames, &mut stream);
+        let key_poses = keys.into_iter().map(|frame| FileKeyframe {
+            file: self.clip.into(),
+            frame,
+            time: frame,
+        });
+        read(&SongChoice {
+            key_poses: key_poses.collect(),
+            frames: Some(frames),
+            ..choice
+        })
+    }
 }

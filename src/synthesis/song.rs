@@ -9,13 +9,13 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::clip_keyframes::{Source, no_frame, read};
-use super::keyframes::{FileFrom, FileKeyframe, KeyframeError, LONGEST};
+use super::keyframes::{FileFrom, FileKeyframe, KeyframeChoice, KeyframeError, LONGEST};
 use super::summary::Units;
 use crate::counted::counted;
 use crate::data::DataConfig;
 use crate::models::generator::{Given, Motion, NeededPoses, Request};
 use crate::models::{Generator, ModelError};
-use crate::motion::bvh::{Axis, Bvh, BvhError, channel_layout};
+use crate::motion::bvh::{self, Axis, Bvh, BvhError, channel_layout};
 use crate::motion::{Clip, Mapping, MappingError, Pose};
 use crate::music::{Analysis, Cache, FRAME_RATE, MusicError};
 
@@ -29,6 +29,48 @@ pub enum Seed {
     Motion(PathBuf, Option<usize>),
     /// One pose, held.
     Pose(FileFrom),
+}
+
+impl Seed {
+    /// The file that it is from.
+    pub fn file(&self) -> &PathBuf {
+        match self {
+            Self::Motion(file, _) => file,
+            Self::Pose(from) => &from.file,
+        }
+    }
+}
+
+/// A song and its seed, before it is known whether the model asks for one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SongRequest {
+    pub music: PathBuf,
+    pub seed: Option<Seed>,
+    /// Frames of the result, where it is to be shorter than the song.
+    pub frames: Option<usize>,
+}
+
+impl SongRequest {
+    /// The files that it names.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        [&self.music]
+            .into_iter()
+            .chain(self.seed.iter().map(Seed::file))
+    }
+
+    /// The same with keyframes as its key poses.
+    ///
+    /// # Errors
+    /// There is no seed.
+    pub fn choice(&self, keyframes: &KeyframeChoice) -> Result<SongChoice, SongError> {
+        Ok(SongChoice {
+            music: self.music.clone(),
+            seed: self.seed.clone().ok_or(SongError::NoSeed)?,
+            key_poses: keyframes.further.clone(),
+            frames: self.frames,
+            mapping: keyframes.mapping.clone(),
+        })
+    }
 }
 
 /// What is asked for.
@@ -54,6 +96,10 @@ pub enum SongError {
     Mapping(#[from] MappingError),
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[error(
+        "a dance goes on from something: give --seed-motion FILE.bvh, or --seed-pose FILE.bvh:FRAME"
+    )]
+    NoSeed,
     #[error("{model} does not dance to music from a seed; give --keyframe or --motion alone")]
     Deaf { model: String },
     #[error(
@@ -106,6 +152,10 @@ pub enum SongError {
     Twice { frame: usize, keys: [String; 2] },
     #[error("{model} gave no rotations")]
     NoRotations { model: String },
+    #[error("the motion cannot be written")]
+    Document(#[source] BvhError),
+    #[error(transparent)]
+    Write(#[from] BvhError),
 }
 
 /// A song, a seed and key poses, read.
@@ -113,6 +163,8 @@ pub struct Song {
     /// What the model is asked.
     pub request: Request,
     pub music: Analysis,
+    /// Its file.
+    pub file: PathBuf,
     /// T', frames of the seed.
     pub seed: usize,
     /// The seed is one pose, held.
@@ -192,11 +244,8 @@ impl Song {
                  frame is {last}, so the dance may jerk to it; put it at frame {free} or later"
             )
         }));
-        let path = match &choice.seed {
-            Seed::Motion(path, _) => path,
-            Seed::Pose(from) => &from.file,
-        };
-        let first = files.read.remove(path).ok_or(KeyframeError::None)?;
+        let first = files.read.remove(choice.seed.file());
+        let first = first.ok_or(KeyframeError::None)?;
         let seed = seed.into_iter().enumerate();
         let given = seed.chain(keys).map(|(frame, pose)| Given {
             frame: frame as i64,
@@ -213,6 +262,7 @@ impl Song {
         Ok(Self {
             request,
             music,
+            file: choice.music.clone(),
             seed: needed,
             held,
             notices,
@@ -249,6 +299,17 @@ impl Song {
         };
         let summary = self.summary(model.name(), &clip);
         Ok((clip, summary))
+    }
+
+    /// The same, written as BVH.
+    ///
+    /// # Errors
+    /// As [`Song::dance`]; the file cannot be written.
+    pub fn write(&self, model: &dyn Generator, path: &Path) -> Result<SongSummary, SongError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let (dance, summary) = self.dance(model, &name)?;
+        bvh::write(path, &self.document(&dance)?)?;
+        Ok(summary)
     }
 
     fn summary(&self, model: &str, clip: &Clip) -> SongSummary {
@@ -292,11 +353,11 @@ impl Song {
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
-    pub fn document(&self, dance: &Clip) -> Result<Bvh, BvhError> {
+    pub fn document(&self, dance: &Clip) -> Result<Bvh, SongError> {
         let channels = self.first.channels.clone();
         let channels =
             channels.unwrap_or_else(|| channel_layout(dance, [Axis::Z, Axis::X, Axis::Y]));
-        Bvh::from_clip(dance, channels)
+        Bvh::from_clip(dance, channels).map_err(SongError::Document)
     }
 }
 

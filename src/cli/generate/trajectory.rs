@@ -2,12 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::models::generator::Condition;
-use crate::synthesis::controls::{Points, Speed, read_trajectory};
-use crate::synthesis::keyframes::Keyframes;
-use crate::synthesis::{ControlWarning, SequenceRequest, moved_warnings};
+use crate::synthesis::controls::{Points, Timing, TrajectoryControls};
 
 #[derive(Debug, Args)]
 pub struct TrajectoryArgs {
@@ -15,7 +12,7 @@ pub struct TrajectoryArgs {
     /// the result; keyframes are moved onto it [default: --motion's, else a smooth curve through
     /// the keyframes]
     #[arg(long, value_name = "FILE.csv")]
-    pub trajectory: Option<PathBuf>,
+    trajectory: Option<PathBuf>,
     /// Root trajectory along a smooth curve through points (cm) "x,z; x,z; ..." or "x,y,z; ...",
     /// from the first frame to the last; without y the root keeps the heights that it would have
     /// had. Keyframes are moved onto it
@@ -43,67 +40,15 @@ pub struct TrajectoryArgs {
     raise: Option<f64>,
 }
 
-/// How fast the root goes along a curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Timing {
-    /// At one speed
-    #[default]
-    Constant,
-    /// In proportion to the speed of the trajectory that the curve replaces: that of --motion
-    Clip,
-}
-
 impl TrajectoryArgs {
-    /// What these controls ask for between the keyframes, if any is given.
-    pub fn asked(&self) -> Option<Condition> {
-        let given =
-            self.trajectory.is_some() || self.trajectory_through.is_some() || self.raise.is_some();
-        given.then_some(Condition::RootTrajectory)
-    }
-
-    /// The request under these controls, and warnings of keyframes that were moved.
-    ///
-    /// # Errors
-    /// A file or number that cannot be used.
-    pub fn apply(
-        &self,
-        mut request: SequenceRequest,
-        keyframes: &Keyframes,
-    ) -> anyhow::Result<(SequenceRequest, Vec<ControlWarning>)> {
-        let flags = ["turn", "scale", "raise"];
-        for (flag, value) in flags.into_iter().zip([self.turn, self.scale, self.raise]) {
-            if let Some(value) = value.filter(|value| value.is_nan() || value.abs() > 1e5) {
-                anyhow::bail!("--{flag} {value}: expected a number between -100000 and 100000");
-            }
+    pub fn controls(&self) -> TrajectoryControls {
+        TrajectoryControls {
+            table: self.trajectory.clone(),
+            through: self.trajectory_through.clone(),
+            timing: self.timing,
+            turn: self.turn,
+            scale: self.scale,
+            raise: self.raise,
         }
-        let trajectory = if let Some(path) = &self.trajectory {
-            read_trajectory(path, request.frames())?
-        } else if let Some(points) = &self.trajectory_through {
-            if self.timing == Timing::Clip && keyframes.motion().is_none() {
-                anyhow::bail!(
-                    "--timing clip takes the speed of --motion; give --motion, or --timing constant"
-                );
-            }
-            let speed = match self.timing {
-                Timing::Constant => Speed::Constant,
-                Timing::Clip => request.own_speed(),
-            };
-            request.trajectory_through(points, &speed)
-        } else {
-            request.root_trajectory.clone()
-        };
-        let (placed, moved) = request.on_trajectory(trajectory)?;
-        let warnings = moved_warnings(&placed, &moved);
-        request = placed;
-        if let Some(degrees) = self.turn {
-            request = request.turned(degrees.to_radians());
-        }
-        if let Some(scale) = self.scale {
-            request = request.scaled(scale)?;
-        }
-        if let Some(height) = self.raise {
-            request = request.raised(height);
-        }
-        Ok((request, warnings))
     }
 }

@@ -24,9 +24,9 @@ use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
 
 #[cfg(feature = "papers")]
-pub use generated::generated_page;
+pub use generated::{check_page, dance_page};
 #[cfg(feature = "papers")]
-pub use song::song_page;
+pub use song::Sound;
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;

@@ -1,6 +1,11 @@
 //! The page of a dance to a song.
 
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use glam::DVec3;
+use url::Url;
 
 use super::{MotionKind, Viewer, ViewerKeyframe, ViewerMotion, ViewerMusic};
 use crate::data::DataConfig;
@@ -8,19 +13,79 @@ use crate::models::ModelError;
 use crate::models::transition::DanceClip;
 use crate::motion::{Clip, JOINTS};
 use crate::report::ReportError;
+use crate::run::FileError;
 use crate::synthesis::song::Song;
+
+/// Where a page has the sound of its song.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sound<'p> {
+    /// In itself.
+    Embedded,
+    /// Where the file is, seen from this path of the page.
+    Beside(&'p Path),
+}
+
+impl ViewerMusic {
+    /// The song of a dance of so many frames.
+    ///
+    /// # Errors
+    /// Its file cannot be read, or has no address that the page could name.
+    fn of(song: &Song, frames: usize, sound: Sound<'_>) -> Result<Self, ReportError> {
+        let name = song.file.file_name().unwrap_or_default();
+        let within = |beats: &[usize]| {
+            let inside = beats.iter().filter(|beat| **beat < frames);
+            inside.copied().collect()
+        };
+        Ok(Self {
+            name: name.to_string_lossy().into(),
+            source: match sound {
+                Sound::Embedded => embedded(&song.file)?,
+                Sound::Beside(page) => address(&song.file, page)?,
+            },
+            beats: within(&song.music.beats),
+            downbeats: within(&song.music.downbeats),
+        })
+    }
+}
+
+/// Where a page finds a file: relative to it, so that both may move together.
+fn address(file: &Path, page: &Path) -> Result<String, ReportError> {
+    let absolute = |path: &Path| {
+        let path = std::path::absolute(path).ok()?;
+        Url::from_file_path(path).ok()
+    };
+    let relative = || absolute(page)?.make_relative(&absolute(file)?);
+    let file = file.display();
+    relative().ok_or_else(|| {
+        ReportError::Refused(format!("{file} has no address that a page could name"))
+    })
+}
+
+/// A sound file as a data URL.
+fn embedded(file: &Path) -> Result<String, FileError> {
+    let content = std::fs::read(file).map_err(FileError::at(file, "read"))?;
+    let kind = match content.get(..4) {
+        Some(b"RIFF") => "wav",
+        Some(b"fLaC") => "flac",
+        Some(b"OggS") => "ogg",
+        _ => "mpeg",
+    };
+    let content = BASE64_STANDARD.encode(content);
+    Ok(format!("data:audio/{kind};base64,{content}"))
+}
 
 /// The page of what a model made of a song, HTML: key poses stand where the dance has its root.
 ///
 /// # Errors
-/// A dance on another skeleton than the dance skeleton.
-pub fn song_page(
+/// A dance on another skeleton than the dance skeleton, a sound that the page cannot have.
+pub(super) fn song_page(
     model: &str,
     song: &Song,
     dance: &Clip,
     data: &DataConfig,
-    music: ViewerMusic,
+    sound: Sound<'_>,
 ) -> Result<String, ReportError> {
+    let music = ViewerMusic::of(song, dance.poses.len(), sound)?;
     let measured = DanceClip::measure(dance.clone(), &data.features());
     let measured = measured.map_err(|error| ModelError::data(&error))?;
     let keys = song.request.given.iter();

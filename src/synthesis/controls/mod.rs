@@ -5,6 +5,7 @@
 //! combine in any order that makes sense: times first, then another trajectory, then turns, scales
 //! and heights, then velocity factors.
 
+mod asked;
 mod csv;
 mod curve;
 mod gains;
@@ -13,6 +14,7 @@ mod timing;
 mod trajectory;
 mod velocity;
 
+pub use self::asked::{ControlError, Timing, TrajectoryControls, VelocityControls};
 pub use self::csv::{TableError, read_trajectory, read_velocity_factors};
 pub(crate) use curve::timed_curve;
 pub use curve::{Speed, smooth_curve};

@@ -1,0 +1,52 @@
+//! What is asked for, whichever of it a model reads.
+
+use std::path::PathBuf;
+
+use crate::models::generator::{Condition, Needs};
+use crate::synthesis::controls::{TrajectoryControls, VelocityControls};
+use crate::synthesis::keyframes::KeyframeChoice;
+use crate::synthesis::song::SongRequest;
+use crate::synthesis::{ContactSequence, SynthesisOptions};
+
+/// A dance as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DanceRequest {
+    /// The name of the result.
+    pub name: String,
+    /// Keyframes, or the key poses of a dance to a song.
+    pub keyframes: KeyframeChoice,
+    /// Frames from each keyframe to the next: none for their own distances, one for all, or one for
+    /// each.
+    pub lengths: Vec<u32>,
+    pub trajectory: TrajectoryControls,
+    pub velocity: VelocityControls,
+    pub contacts: Option<ContactSequence>,
+    /// What is drawn follows from it.
+    pub seed: u64,
+    pub song: Option<SongRequest>,
+    pub options: SynthesisOptions,
+}
+
+impl DanceRequest {
+    /// The files that it names.
+    pub fn files(&self) -> Vec<&PathBuf> {
+        let mut files = self.keyframes.files();
+        files.extend(self.trajectory.table.iter().chain(&self.velocity.table));
+        files.extend(self.song.iter().flat_map(SongRequest::files));
+        files.extend(self.velocity.from.iter().map(|from| &from.file));
+        files
+    }
+
+    /// What is asked for beside poses that a model with these needs does not read.
+    pub(super) fn unread(&self, needs: &Needs) -> Vec<Condition> {
+        let contacts = self.contacts.as_ref().map(|_| Condition::Contacts);
+        let asked = [self.trajectory.asked(), self.velocity.asked(), contacts];
+        let asked = asked.into_iter().flatten();
+        asked.filter(|&it| !needs.reads(it)).collect()
+    }
+}
+
+/// The warning of a model for which poses alone matter.
+pub(super) fn left_out(condition: Condition) -> String {
+    format!("the model does not read {}: left out", condition.title())
+}

@@ -1,0 +1,41 @@
+//! A dance to a song, from a seed and key poses.
+
+use super::request::left_out;
+use super::{Dance, DanceError, DanceRequest, DanceSummary, Origin};
+use crate::data::DataConfig;
+use crate::music::Cache;
+use crate::run::Subject;
+use crate::synthesis::song::{Song, SongRequest};
+
+pub(super) fn make(
+    subject: &Subject,
+    asked: &DanceRequest,
+    wanted: &SongRequest,
+    data: &DataConfig,
+    warn: &mut dyn FnMut(String),
+) -> Result<Dance, DanceError> {
+    let (model, refused) = (&*subject.model, |text| Err(DanceError::Refused(text)));
+    if asked.keyframes.motion.is_some() {
+        return refused("--motion gives no key poses to a song; name each with --keyframe".into());
+    }
+    if asked.options.foot_cleanup {
+        let what = &subject.what;
+        return refused(format!(
+            "--foot-cleanup: {what} says of no foot that it stands"
+        ));
+    }
+    let choice = wanted.choice(&asked.keyframes)?;
+    let song = Song::read(&choice, model, data, &Cache::of_user())?;
+    let unread = asked.unread(&model.needs()).into_iter();
+    unread.map(left_out).for_each(&mut *warn);
+    song.notices.iter().cloned().for_each(warn);
+    let (dance, summary) = song.dance(model, &asked.name)?;
+    Ok(Dance {
+        document: song.document(&dance)?,
+        summary: DanceSummary::Song(summary),
+        origin: Origin::Song {
+            song: Box::new(song),
+            dance,
+        },
+    })
+}
