@@ -68,7 +68,7 @@ pub struct EvaluateArgs {
 /// The run, its weights or the data cannot be used, or do not fit each other; nothing is written
 /// then. A file cannot be written.
 pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
-    let subject = Subject::open(&args.run, &args.set)?;
+    let mut subject = Subject::open(&args.run, &args.set)?;
     let own = subject.files();
     let inputs = own.iter().chain([&args.data]);
     check_outputs_beside(args.out.as_deref(), &args.json, inputs, args.force)?;
@@ -77,6 +77,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     if !args.other_data {
         subject.check_data(&dataset, &args.data)?;
     }
+    subject.model.look_up_in(&dataset.train)?;
     let lengths = BTreeSet::from_iter(args.lengths.into_iter().map(usize::from));
     let choice = ScoringChoice {
         part: args.clips,

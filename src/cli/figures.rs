@@ -62,9 +62,9 @@ pub struct FiguresArgs {
 /// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is
 /// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
-    let subject = Subject::open(&args.run, &[])?;
+    let mut subject = Subject::open(&args.run, &[])?;
     let compared = args.compare.iter().map(|path| Subject::open(path, &[]));
-    let compared = compared.collect::<Result<Vec<_>, _>>()?;
+    let mut compared = compared.collect::<Result<Vec<_>, _>>()?;
     let models = || compared.iter().chain([&subject]);
     let inputs: Vec<PathBuf> = models().flat_map(Subject::files).collect();
     let inputs = inputs.iter().chain([&args.data]);
@@ -75,6 +75,9 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     warn(&dataset.warnings);
     if !args.other_data {
         models().try_for_each(|model| model.check_data(&dataset, &args.data))?;
+    }
+    for model in compared.iter_mut().chain([&mut subject]) {
+        model.model.look_up_in(&dataset.train)?;
     }
     let asked = FigureRequest {
         subject: &subject,

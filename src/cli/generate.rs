@@ -13,6 +13,7 @@ use clap::Args;
 
 use super::file_units::FileUnits;
 use super::notice::warn;
+use crate::data::Dataset;
 use crate::motion::bvh;
 use crate::report::viewer::{check_page, dance_page};
 use crate::run::{Subject, beside_clips, check_outputs, replace_file, write_json};
@@ -57,6 +58,10 @@ pub struct GenerateArgs {
     seed: u64,
     #[command(flatten)]
     song: SongArgs,
+    /// Folder of clips, for a model that looks motion up in those that train, as its config says
+    /// which: key_pose_retrieval
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
     /// Pin the feet where the model predicts contact
     #[arg(long)]
     foot_cleanup: bool,
@@ -101,19 +106,25 @@ impl GenerateArgs {
 /// The run, a file or a control cannot be used, or they do not fit each other; nothing is written
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
-    let subject = Subject::open(&args.run, &args.set)?;
+    let mut subject = Subject::open(&args.run, &args.set)?;
     subject.check_features()?;
     Dance::check_model(&subject)?;
     let data = args.units.over(&subject.config.data);
     let request = args.request(data.fps);
     let (mut inputs, own) = (request.files(), subject.files());
     inputs.extend(&own);
+    inputs.extend(&args.data);
     let outputs = args.viewer.iter().chain(&args.json).chain([&args.out]);
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
     if args.viewer.is_some() {
         check_page(&subject, &request, &args.out)?;
+    }
+    if let Some(folder) = &args.data {
+        let dataset = Dataset::load(folder, &subject.config.data)?;
+        warn(&dataset.warnings);
+        subject.model.look_up_in(&dataset.train)?;
     }
     let dance = Dance::make(&subject, &request, &data, &mut |notice| warn([notice]))?;
     let page = match &args.viewer {

@@ -120,6 +120,25 @@ impl PrintedTables {
         Ok(printed)
     }
 
+    /// No numbers: tables of these metrics, and of no others.
+    pub fn of_metrics(metrics: &[&str]) -> Self {
+        let table = |metric: &&str| PrintedTable {
+            number: None,
+            metric: (*metric).into(),
+            columns: None,
+            rows: None,
+        };
+        Self {
+            tables: metrics.iter().map(table).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether its tables are those to show and it has no numbers of its own.
+    pub(super) fn is_choice(&self) -> bool {
+        self.rows.is_empty() && !self.tables.is_empty()
+    }
+
     /// Whether its numbers stand beside scores by this protocol.
     pub fn compares(&self, protocol: &str) -> bool {
         self.protocol.as_deref().is_none_or(|own| own == protocol)

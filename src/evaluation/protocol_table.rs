@@ -114,7 +114,7 @@ impl<'a> ProtocolTable<'a> {
         if columns.iter().any(|column| column == AVERAGE) {
             out += "AVG is the mean over the lengths. ";
         }
-        if self.is_compared() {
+        if self.is_compared() && !self.printed.is_choice() {
             out += "The difference is ours minus the paper's. ";
             if let Some(note) = &self.printed.note {
                 out += &format!("{note} ");
@@ -204,8 +204,15 @@ impl<'a> ProtocolTable<'a> {
 
     pub(super) fn terminal(&self) -> String {
         let all = self.all_columns();
-        let metrics = self.protocol.metrics();
-        let titles = metrics.iter().map(block_title);
+        let metrics: Vec<&Metric> = match self.printed.is_choice() {
+            true => self
+                .tables()
+                .into_iter()
+                .map(|(_, metric)| metric)
+                .collect(),
+            false => self.protocol.metrics().iter().collect(),
+        };
+        let titles = metrics.iter().map(|metric| block_title(metric));
         let names = self.rows.iter().map(|row| row.name.clone());
         let widths = titles.chain(names).map(|name| name.chars().count());
         let width = widths.max().unwrap_or(0) + 1;

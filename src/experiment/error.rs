@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::ConfigError;
 use crate::data::{DataError, EmptyPart};
 use crate::evaluation::{EvaluationError, PrintedError, RecordError};
+use crate::models::ModelError;
 use crate::models::settings::ValueError;
 use crate::report::FigureError;
 use crate::run::{FileError, RunError};
@@ -41,6 +42,8 @@ pub enum ReproduceError {
     Printed(#[from] PrintedError),
     #[error(transparent)]
     Run(#[from] RunError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
     #[error(transparent)]
     Training(#[from] TrainingError),
     #[error(transparent)]

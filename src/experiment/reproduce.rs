@@ -218,7 +218,8 @@ impl Reproduction<'_> {
                 ))?);
             }
         }
-        if let Some(model) = row.config.model.untrained(&row.config.data) {
+        if let Some(mut model) = row.config.model.untrained(&row.config.data) {
+            model.look_up_in(&self.dataset.train)?;
             let scores = self.evaluate(row, &*model)?;
             return results.write(row, None, scores, self.dataset);
         }

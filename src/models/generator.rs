@@ -28,6 +28,7 @@ use ndarray::{Array1, Array2, Array3};
 use thiserror::Error;
 
 use super::settings::ValueError;
+use crate::data::Recording;
 use crate::motion::{Clip, ContactRule, Mapping, Pose, Skeleton};
 #[cfg(feature = "music")]
 use crate::music::FeatureSet;
@@ -129,6 +130,15 @@ pub trait Generator: Send + Sync {
     fn name(&self) -> &str;
 
     fn needs(&self) -> Needs;
+
+    /// Hands over the training clips before the first request, to a model that looks motion up in
+    /// them; others leave them alone. Clips to be scored on never come here.
+    ///
+    /// # Errors
+    /// Clips that it cannot look up in.
+    fn look_up_in(&mut self, _training: &[Recording]) -> Result<(), ModelError> {
+        Ok(())
+    }
 
     /// A motion for every request, in their order. Each depends on its own request alone; those of
     /// one call may differ in length.

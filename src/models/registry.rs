@@ -5,8 +5,12 @@ use std::sync::{Arc, PoisonError, RwLock};
 use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::{
-    baselines::rotations::RotationBaseline, duan2022::Duan2022Kind,
-    harvey2020::Harvey2020RotationsKind, li2023::Li2023Kind, pu2022::Pu2022Kind, transition::Kind,
+    baselines::{retrieval::KeyPoseRetrievalKind, rotations::RotationBaseline},
+    duan2022::Duan2022Kind,
+    harvey2020::Harvey2020RotationsKind,
+    li2023::Li2023Kind,
+    pu2022::Pu2022Kind,
+    transition::Kind,
 };
 
 /// Kinds that were [added](add) from outside.
@@ -41,6 +45,8 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(RotationBaseline::KeyPoseInterpolation),
         #[cfg(feature = "papers")]
         Arc::new(RotationBaseline::HeldSeed),
+        #[cfg(feature = "papers")]
+        Arc::new(KeyPoseRetrievalKind),
     ]
 }
 

@@ -15,6 +15,7 @@ use crate::autograd::check::CheckReport;
 use crate::data::{DataConfig, Dataset};
 use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::nn::Initialiser;
+use crate::report::demo::OpenDemo;
 use crate::report::figures::DrawFigures;
 
 /// What draws a model's initial weights.
@@ -29,6 +30,8 @@ pub struct Paper {
     pub printed: &'static str,
     /// What draws its figures.
     pub figures: Option<DrawFigures>,
+    /// What shows its model without data.
+    pub demo: Option<OpenDemo>,
     /// How its tables score a model, for data that is read like this. The first protocol also
     /// scores a training on validation clips.
     pub protocols: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,

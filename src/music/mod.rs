@@ -45,6 +45,7 @@ pub mod sound;
 pub mod spectrum;
 mod summary;
 pub mod tempo;
+mod wav;
 
 pub use analysis::Analysis;
 pub use cache::Cache;
@@ -53,3 +54,4 @@ pub use error::MusicError;
 pub use features::FeatureSet;
 pub use sound::{FRAME_RATE, HOP, RATE, Sound};
 pub use summary::Summary;
+pub use wav::write_wav;

@@ -11,6 +11,8 @@ use crate::motion::fit::RotationFitError;
 use crate::run::{FileError, RunError};
 #[cfg(feature = "papers")]
 use crate::synthesis::SynthesisError;
+#[cfg(feature = "papers")]
+use crate::synthesis::song::SongError;
 
 /// Why a figure cannot be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,6 +66,9 @@ pub enum ReportError {
     #[cfg(feature = "papers")]
     #[error(transparent)]
     Synthesis(#[from] SynthesisError),
+    #[cfg(feature = "papers")]
+    #[error(transparent)]
+    Song(#[from] Box<SongError>),
     #[error(transparent)]
     Rotations(#[from] RotationFitError),
     #[error(transparent)]

@@ -6,7 +6,6 @@
 
 pub mod chart;
 mod dancer;
-#[cfg(feature = "papers")]
 pub mod demo;
 mod error;
 pub mod figures;

@@ -14,9 +14,7 @@ mod subject;
 mod trained_model;
 
 pub use durable::FileError;
-#[cfg(feature = "papers")]
-pub(crate) use durable::remove as remove_file;
-pub(crate) use durable::{replace as replace_file, write_json};
+pub(crate) use durable::{remove as remove_file, replace as replace_file, write_json};
 pub use error::RunError;
 pub use folder::RunFolder;
 pub use log::LogLine;

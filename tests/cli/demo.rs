@@ -7,7 +7,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use keydance::evaluation::{ProtocolScores, ScoreRow, Scores};
 use keydance::motion::bvh;
-use keydance::report::demo::Comparison;
+use keydance::report::demo::pan2021::Comparison;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;

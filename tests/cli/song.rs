@@ -329,3 +329,72 @@ fn the_viewer_plays_the_song_where_it_is_or_holds_it_where_asked() {
     );
     assert!(loaded.console().is_empty(), "{:?}", loaded.console());
 }
+
+/// The row `retrieval` on the fixture's split.
+const RETRIEVAL: &str = "name = 'retrieval'\n[model]\nkind = 'key_pose_retrieval'\n\
+    [data]\nsplit = { share = 0.8 }\nmusic = true\n";
+
+#[test]
+fn retrieval_finds_the_training_clips_again_and_never_looks_motion_up_in_the_test_clips() {
+    let folder = TempDir::new().unwrap();
+    let rows = folder.path().join("rows");
+    fs::create_dir(&rows).unwrap();
+    let config = rows.join("retrieval.toml");
+    fs::write(&config, RETRIEVAL).unwrap();
+    let error = |file: &Path| {
+        let scores: Value = serde_json::from_slice(&fs::read(file).unwrap()).unwrap();
+        let scores = &scores["music_dance"];
+        assert!(scores["key_pose_error"]["all"].as_f64().unwrap() < 1e-6);
+        scores["position_error"]["all"].as_f64().unwrap()
+    };
+    let [train, test] = ["train", "test"].map(|clips| {
+        let json = folder.path().join(clips);
+        let mut command = FIXTURE.command("evaluate");
+        command.arg(&config).arg("--data").arg(FIXTURE.path("data"));
+        command.args(["--clips", clips]).arg("--json").arg(&json);
+        command.assert().success();
+        error(&json)
+    });
+    assert!(train < 1e-6 && test > 1.0, "{train} {test}");
+    let out = folder.path().join("out");
+    let mut command = FIXTURE.command("reproduce");
+    command.arg(&rows).arg("--data").arg(FIXTURE.path("data"));
+    command.arg("--runs").arg(folder.path().join("runs"));
+    command.arg("--out").arg(&out).assert().success();
+    assert_eq!(error(&out.join("retrieval/evaluation.json")), test);
+}
+
+#[test]
+fn retrieval_dances_to_a_song_by_the_clips_that_it_is_given() {
+    let folder = TempDir::new().unwrap();
+    let (config, out) = (
+        folder.path().join("retrieval.toml"),
+        folder.path().join("dance.bvh"),
+    );
+    fs::write(&config, RETRIEVAL).unwrap();
+    let generate = || {
+        let mut command = FIXTURE.command("generate");
+        command
+            .arg(&config)
+            .arg("--music")
+            .arg(FIXTURE.file(0, "wav"));
+        command
+            .arg("--seed-motion")
+            .arg(format!("{}:0", FIXTURE.file(0, "bvh").display()));
+        command
+            .arg("--keyframe")
+            .arg(FIXTURE.key("75@4s"))
+            .arg("--out")
+            .arg(&out);
+        command
+    };
+    let without = generate().assert().failure();
+    without.stderr(contains("give their folder with --data"));
+    assert!(!out.exists());
+    let mut command = generate();
+    command.arg("--data").arg(FIXTURE.path("data"));
+    let output = command.assert().success();
+    output.stdout(contains(
+        "key pose at frame 120 (4.00 s): joints 0.0 cm from it",
+    ));
+}

@@ -35,6 +35,7 @@ mod prior;
 mod pu2022;
 mod published;
 mod ranges;
+mod retrieval;
 mod root_frame;
 mod rotations;
 mod schedule;

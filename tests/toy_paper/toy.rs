@@ -67,6 +67,7 @@ impl ModelKind for ToyKind {
             printed: "title = 'Toy 2026'\ncolumns = ['all']\n[[tables]]\nnumber = 1\nmetric = 'nll'\n\
                 [rows.toy]\ntitle = 'Toy'\nnll = [2.5]",
             figures: None,
+            demo: None,
             protocols: |_, _| vec![Box::new(ToyProtocol)],
         }]
     }

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::{ChoreographyConfig, ChoreographyError, GeneratedClip, clips, clips_with_music};
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, channel_layout};
-use crate::music::RATE;
+use crate::music::write_wav;
 use crate::run::FileError;
 
 /// Why a generated dance cannot be written.
@@ -15,11 +15,9 @@ pub enum DanceFileError {
     #[error(transparent)]
     Choreography(#[from] ChoreographyError),
     #[error(transparent)]
-    Folder(#[from] FileError),
+    File(#[from] FileError),
     #[error(transparent)]
     Bvh(#[from] BvhError),
-    #[error("{path} cannot be written")]
-    Sound { path: PathBuf, source: hound::Error },
 }
 
 /// Writes the clips of a configuration into a folder, made where there is none, as they are asked
@@ -43,25 +41,8 @@ pub fn write_clips(
         let path = folder.join(&clip.name);
         bvh::write(&path, &Bvh::from_clip(&clip, channels)?)?;
         if let Some(samples) = samples {
-            let path = path.with_extension("wav");
-            write_wav(&path, &samples).map_err(|source| DanceFileError::Sound { path, source })?;
+            write_wav(&path.with_extension("wav"), &samples)?;
         }
         Ok(path)
     }))
-}
-
-/// One channel of 16 bits at 22,050 Hz.
-fn write_wav(path: &Path, samples: &[f32]) -> Result<(), hound::Error> {
-    let spec = hound::WavSpec {
-        channels: 1,
-        sample_rate: RATE,
-        bits_per_sample: 16,
-        sample_format: hound::SampleFormat::Int,
-    };
-    let mut writer = hound::WavWriter::create(path, spec)?;
-    for &sample in samples {
-        let sample = (sample.clamp(-1.0, 1.0) * f32::from(i16::MAX)).round() as i16;
-        writer.write_sample(sample)?;
-    }
-    writer.finalize()
 }

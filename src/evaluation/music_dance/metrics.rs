@@ -34,7 +34,7 @@ const fn metric(
 
 /// Real motion and chance stand beside the score that they are the yardstick of.
 #[rustfmt::skip]
-pub(super) const METRICS: [Metric; 30] = [
+pub(super) const METRICS: [Metric; 31] = [
     metric("consistency", "consistency error", "squared norm", Lower, 4,
         "squared norm of the difference of a key pose's 144 rotation numbers and the model's at its \
          frame, before they are made rotations, a mean over key poses (eq. 13)"),
@@ -68,6 +68,9 @@ pub(super) const METRICS: [Metric; 30] = [
     metric("beat_hit_rate_chance", "beat hit rate, chance", "%", Neither, 1,
         "the same of the recorded dance with the music's beats shifted round the clip, a mean over \
          200 shifts"),
+    metric("beat_hit_rate_shifted", "beat hit rate, shifted, 97.5 %", "%", Neither, 1,
+        "the same of the dance itself with the music's beats shifted round the clips, that which \
+         97.5 % of 200 shifts do not exceed: a higher hit rate is not by chance"),
     metric("beat_alignment", "beat alignment", "0 to 1", Higher, 3,
         "exp(-d^2 / (2 x 1.5^2)), d the frames from a music beat to the nearest motion beat, a mean \
          over music beats and clips"),
@@ -210,6 +213,11 @@ pub(super) fn rows(measured: &Measured) -> Vec<(&'static str, ScoreRow)> {
     ] {
         rows.beats(keys, of);
     }
+    let shifted = (1..).zip(beats.made_by_chance());
+    rows.columns(
+        "beat_hit_rate_shifted",
+        shifted.map(|(delta, rate): (usize, _)| (delta, rate)),
+    );
     let windows = [made, real, train];
     let kinetic = windows.map(|windows| features(windows, |it| &it.kinetic));
     let geometric = windows.map(|windows| features(windows, |it| &it.geometric));

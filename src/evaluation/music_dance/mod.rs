@@ -63,8 +63,9 @@ const CUT: WindowCut = WindowCut {
 /// **Whole clips** for the beats: the first 60 frames are the seed and scored with the rest, key
 /// poses stand every 45 frames to the clip's end.
 ///
-/// Beside a score of the model stand those of the recorded dance, of chance (beats shifted round
-/// the clip), and of the training clips, which are the floor of the Frechet distances.
+/// Beside a score of the model stand those of the recorded dance, of chance (the recorded dance and
+/// beats shifted round the clip), and of the training clips, which are the floor of the Frechet
+/// distances; beside its beat hits those that its own dance has by chance.
 ///
 /// Clips are on one skeleton with the joints of the dance skeleton, at 30 frames a second, with
 /// music.
@@ -91,6 +92,11 @@ impl MusicDance {
     /// How windows are cut from clips.
     pub fn windows(&self) -> WindowCut {
         CUT
+    }
+
+    /// Frames at which key poses are given in a whole dance of so many frames.
+    pub fn key_frames(&self, frames: usize) -> impl Iterator<Item = usize> {
+        request::key_frames(frames)
     }
 
     fn cut(&self, frames: &[usize]) -> Vec<Window> {

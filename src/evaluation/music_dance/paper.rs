@@ -8,5 +8,6 @@ pub const PU2022: Paper = Paper {
     name: "pu2022",
     printed: include_str!("../../../experiments/pu2022/paper.toml"),
     figures: None,
+    demo: Some(crate::report::demo::pu2022::open),
     protocols: |_, options| vec![Box::new(MusicDance::new(options))],
 };

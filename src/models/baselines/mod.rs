@@ -11,6 +11,7 @@ use crate::motion::features::{FACING, ROOT_POSITION, write_velocities};
 
 pub mod interpolation;
 pub mod linear_positions;
+pub mod retrieval;
 pub mod rotations;
 pub mod zero_velocity;
 

@@ -59,6 +59,7 @@ pub const DANCE: Paper = Paper {
     name: "li2023",
     printed: include_str!("../../../experiments/li2023/paper.toml"),
     figures: Some(figures::draw),
+    demo: None,
     protocols: |data, options| vec![Box::new(InBetweening::dance(data, options))],
 };
 
@@ -67,5 +68,6 @@ pub const LAFAN1: Paper = Paper {
     name: "li2023_lafan1",
     printed: include_str!("../../../experiments/li2023_lafan1/paper.toml"),
     figures: Some(figures::draw),
+    demo: None,
     protocols: |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
 };

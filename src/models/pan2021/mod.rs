@@ -37,6 +37,7 @@ pub const PAPER: Paper = Paper {
     name: "pan2021",
     printed: include_str!("../../../experiments/pan2021/paper.toml"),
     figures: Some(crate::report::figures::pan2021::draw),
+    demo: Some(crate::report::demo::pan2021::open),
     protocols,
 };
 

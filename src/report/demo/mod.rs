@@ -1,49 +1,123 @@
-//! What a demo leaves: tables, scores, curves, and one transition to look at.
+//! Demos: what a paper's model does, without data. Dances are generated, a small model is trained on
+//! them and scored beside what needs no training, and something of it is left to look at. One
+//! folder a paper.
 
-mod comparison;
 mod losses;
-mod settings;
-mod showcase;
+#[cfg(feature = "papers")]
+pub mod pan2021;
+#[cfg(feature = "papers")]
+pub mod pu2022;
 
-use std::fmt;
+pub use losses::Losses;
+
 use std::path::Path;
 
-use super::ReportError;
-use crate::data::{DataPart, Dataset};
-use crate::evaluation::{
-    EvaluatedData, Evaluation, EvaluationError, EvaluationRecord, Protocol, ProtocolScores, Tables,
-};
+use super::{ReportError, thousands};
+use crate::counted::counted;
+use crate::data::choreography::ChoreographyConfig;
+use crate::data::{DataPart, Dataset, Recording};
+use crate::evaluation::{EvaluatedData, EvaluationRecord, ProtocolScores, TableRow, Tables};
 use crate::experiment::ExperimentConfig;
-use crate::models::baselines::interpolation::Interpolation;
-use crate::models::transition::DanceClip;
-use crate::models::{Generator, ModelError};
+use crate::models::Generator;
 use crate::run::{RunFolder, check_output_folder, remove_file, replace_file, write_json};
-use showcase::Showcase;
-
-pub use comparison::Comparison;
-pub use losses::Losses;
-pub use settings::DemoSettings;
 
 const TABLES: &str = "tables.md";
 const LOSS_CURVE: &str = "loss_curve.svg";
-/// Name of the file with the transition that is shown.
-const TRANSITION: &str = "transition.bvh";
-const FIGURE: &str = "motion.svg";
-const VIEWER: &str = "viewer.html";
-const INTERPOLATION: &str = "interpolation.json";
-const UNTRAINED: &str = "untrained.json";
 const CHOREOGRAPHY: &str = "choreography.toml";
 
-/// A demo in its folder.
-pub struct Demo {
-    settings: DemoSettings,
-    pub run: RunFolder,
-    /// The generated clips.
-    pub dataset: Dataset,
+/// Makes a paper's demo ready: a line of [`crate::models::Paper`].
+pub type OpenDemo = fn(&DemoOptions) -> Result<Box<dyn Demo>, ReportError>;
+
+/// How large a demo is to be.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DemoOptions {
+    /// Less of everything, for tests.
+    pub reduced: bool,
+    /// Share of the schedule that is trained, above 0 and at most 1, in place of the demo's own.
+    pub fraction: Option<f64>,
+}
+
+/// A paper's demo.
+pub trait Demo {
+    /// What is generated.
+    fn choreography(&self) -> &ChoreographyConfig;
+
+    /// What is trained.
+    fn experiment(&self) -> &ExperimentConfig;
+
+    /// What the trained model is called in the tables.
+    fn model_title(&self) -> &'static str;
+
+    /// The generated clips, split as the experiment says.
+    ///
+    /// # Errors
+    /// They cannot be generated or measured.
+    fn dataset(&self) -> Result<Dataset, ReportError>;
+
+    /// What is scored beside the model; `untrained` is the model before its training.
+    fn others(&self, untrained: Box<dyn Generator>) -> Vec<Other>;
+
+    /// The metrics of its tables; none: those of the paper's, with its numbers.
+    fn metrics(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Names of the files of this demo alone: scores of the others, and what [`Demo::show`] writes.
+    fn files(&self) -> &'static [&'static str];
+
+    /// Writes files to look at into a folder; what they show, in a line.
+    ///
+    /// # Errors
+    /// The model fails, or a file cannot be written.
+    fn show(
+        &self,
+        model: &dyn Generator,
+        dataset: &Dataset,
+        folder: &Path,
+    ) -> Result<String, ReportError>;
+
+    /// Whether the model with these scores reached the demo's goal.
+    fn verdict(&self, model: &ProtocolScores, others: &OtherScores) -> Verdict;
+}
+
+/// What is scored beside a demo's model.
+pub struct Other {
+    /// What it is called in the tables.
+    pub title: &'static str,
+    /// Name of the file of its scores.
+    pub file: &'static str,
+    /// How it was trained.
+    pub note: &'static str,
+    pub model: Box<dyn Generator>,
+}
+
+/// Scores of the others by their files.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OtherScores(pub Vec<(&'static str, ProtocolScores)>);
+
+impl OtherScores {
+    /// No scores of a file that is not there.
+    pub fn of(&self, file: &str) -> ProtocolScores {
+        let found = self.0.iter().find(|(known, _)| *known == file);
+        found.map_or_else(ProtocolScores::default, |(_, scores)| scores.clone())
+    }
+}
+
+/// Whether a demo's goal is reached.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    pub reached: bool,
+    /// The goal with the numbers that decide it.
+    pub numbers: String,
+    /// What it means where the goal is not reached.
+    pub missed: &'static str,
 }
 
 /// Refuses a folder that holds something else than an earlier demo.
-fn check_folder(folder: &Path) -> Result<(), ReportError> {
+///
+/// # Errors
+/// It does.
+pub fn check_folder(folder: &Path) -> Result<(), ReportError> {
     let problem =
         if folder.join(CHOREOGRAPHY).exists() || check_output_folder(folder, false).is_ok() {
             return Ok(());
@@ -58,127 +132,72 @@ fn check_folder(folder: &Path) -> Result<(), ReportError> {
     )))
 }
 
-impl Demo {
-    /// Takes the place of an earlier demo: what that left beside its run is removed, as a demo that
-    /// is interrupted must not leave results of two; and what is generated is written, by which the
-    /// folder is known as a demo's.
-    ///
-    /// # Errors
-    /// The folder holds something else, or a file cannot be removed or written.
-    pub fn begin(folder: &Path, settings: DemoSettings) -> Result<Self, ReportError> {
-        check_folder(folder)?;
-        let run = RunFolder::replace(folder, &settings.experiment)?;
-        let own = [
-            TABLES,
-            LOSS_CURVE,
-            TRANSITION,
-            FIGURE,
-            VIEWER,
-            INTERPOLATION,
-            UNTRAINED,
-        ];
-        let scores = EvaluationRecord::files(DataPart::Test);
-        own.iter()
-            .chain(&scores)
-            .try_for_each(|name| remove_file(&folder.join(name)))?;
-        let choreography = toml::to_string(&settings.choreography)?;
-        replace_file(&folder.join(CHOREOGRAPHY), choreography)?;
-        Ok(Self {
-            dataset: settings.dataset()?,
-            settings,
-            run,
-        })
-    }
-
-    /// What is trained.
-    pub fn config(&self) -> &ExperimentConfig {
-        &self.settings.experiment
-    }
-
-    /// The trained model.
-    ///
-    /// # Errors
-    /// It was not trained.
-    pub fn model(&self) -> Result<Box<dyn Generator>, ReportError> {
-        Ok(self.run.trained_model(self.config())?)
-    }
-
-    fn interpolation(&self) -> Interpolation {
-        Interpolation {
-            contact_threshold: self.config().data.contact_threshold,
-        }
-    }
-
-    /// Writes the loss curve.
-    ///
-    /// # Errors
-    /// There is no loss to draw, or the file cannot be written.
-    pub fn write_losses(&self, losses: &Losses) -> Result<(), ReportError> {
-        let path = self.run.path().join(LOSS_CURVE);
-        Ok(replace_file(&path, losses.figure()?)?)
-    }
-
-    /// Sets the model beside interpolation and beside itself before its training, scored as
-    /// `evaluate` does: writes tables and scores, and gives the tables as plain text, too.
-    ///
-    /// # Errors
-    /// A model that cannot be scored, or a file that cannot be written.
-    pub fn compare(
-        &self,
-        untrained: &dyn Generator,
-        model: &dyn Generator,
-        evaluate: impl Fn(&dyn Protocol, &dyn Generator) -> Result<Evaluation, EvaluationError>,
-    ) -> Result<(Comparison, String), ReportError> {
-        let (config, folder) = (self.config(), self.run.path());
-        // The paper's numbers are of other data, so its own way of counting adds nothing here.
-        let protocols = &config.protocols()[..1];
-        let protocol = &*protocols[0];
-        let scores = |model: &dyn Generator| -> Result<ProtocolScores, EvaluationError> {
-            let scores = evaluate(protocol, model)?.scores;
-            Ok(ProtocolScores::new([(protocol.name(), scores)]))
-        };
-        let comparison = Comparison {
-            interpolation: scores(&self.interpolation())?,
-            untrained: scores(untrained)?,
-            model: scores(model)?,
-        };
-        let none = || ReportError::Refused("the training left no manifest".into());
-        let manifest = self.run.manifest()?.ok_or_else(none)?;
-        let rows = comparison.rows(config, &manifest);
-        let printed = &config.printed()?;
-        let tables = Tables { protocols, printed };
-        let markdown = tables.markdown(&rows, &self.settings.subject(&self.dataset));
-        replace_file(&folder.join(TABLES), markdown)?;
-        write_json(&folder.join(INTERPOLATION), &comparison.interpolation)?;
-        write_json(&folder.join(UNTRAINED), &comparison.untrained)?;
-        let record = EvaluationRecord {
-            scores: comparison.model.clone(),
-            data: EvaluatedData::of(&self.dataset, DataPart::Test)?,
-        };
-        record.write(folder)?;
-        Ok((comparison, tables.terminal(&rows)))
-    }
-
-    /// Writes one transition as motion, figure and page, and says which.
-    ///
-    /// # Errors
-    /// No clip is long enough, a model fails, or a file cannot be written.
-    pub fn show(&self, model: &dyn Generator) -> Result<String, ReportError> {
-        let features = self.config().data.features();
-        let clips = DanceClip::measure_all(&self.dataset.test, &features);
-        let clips = clips.map_err(|error| ModelError::data(&error))?;
-        let showcase = Showcase::new(&clips)?;
-        let motion = showcase.write(&self.interpolation(), model, self.run.path())?;
-        Ok(format!(
-            "{TRANSITION}: {showcase}; its rotations meet the predicted positions to {:.1} cm in \
-             the mean, {:.1} cm at most",
-            motion.mean_error, motion.max_error
-        ))
-    }
+/// Removes what an earlier demo left beside its run, as a demo that is interrupted must not leave
+/// results of two; and writes what is generated, by which the folder is known as a demo's.
+///
+/// # Errors
+/// A file cannot be removed or written.
+pub fn begin_results(folder: &Path, demo: &dyn Demo) -> Result<(), ReportError> {
+    let scores = EvaluationRecord::files(DataPart::Test);
+    let own = [TABLES, LOSS_CURVE].into_iter().chain(scores);
+    own.chain(demo.files().iter().copied())
+        .try_for_each(|name| remove_file(&folder.join(name)))?;
+    let choreography = toml::to_string(demo.choreography())?;
+    Ok(replace_file(&folder.join(CHOREOGRAPHY), choreography)?)
 }
 
-impl fmt::Display for Demo {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.settings.summary(&self.dataset))
+/// Writes the loss curve.
+///
+/// # Errors
+/// There is no loss to draw, or the file cannot be written.
+pub fn write_losses(folder: &Path, losses: &Losses) -> Result<(), ReportError> {
+    Ok(replace_file(&folder.join(LOSS_CURVE), losses.figure()?)?)
+}
+
+/// Writes tables, the scores of the model and of the others by their files.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_scores(
+    folder: &Path,
+    demo: &dyn Demo,
+    dataset: &Dataset,
+    model: &ProtocolScores,
+    others: &OtherScores,
+    tables: Tables<'_>,
+    rows: &[TableRow],
+) -> Result<(), ReportError> {
+    let choreography = demo.choreography();
+    let subject = format!(
+        "{} of {} of {} (seed {})",
+        dataset.test.len(),
+        counted(choreography.clips, "generated clip"),
+        counted(choreography.frames_per_clip, "frame"),
+        choreography.seed
+    );
+    replace_file(&folder.join(TABLES), tables.markdown(rows, &subject))?;
+    for (file, scores) in &others.0 {
+        write_json(&folder.join(file), scores)?;
     }
+    EvaluationRecord {
+        scores: model.clone(),
+        data: EvaluatedData::of(dataset, DataPart::Test)?,
+    }
+    .write(folder)?;
+    Ok(())
+}
+
+/// The data in words.
+pub fn summary(demo: &dyn Demo, dataset: &Dataset) -> String {
+    let of = |clips: &[Recording]| {
+        let frames: usize = clips.iter().map(Recording::frames).sum();
+        (clips.len(), thousands(frames as u64))
+    };
+    let ((train, frames), (test, test_frames)) = (of(&dataset.train), of(&dataset.test));
+    format!(
+        "{} to train on ({frames} frames), {test} to test on ({test_frames} frames), generated \
+         from seed {}",
+        counted(train, "clip"),
+        demo.choreography().seed
+    )
 }

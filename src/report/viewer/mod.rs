@@ -26,7 +26,7 @@ use positions::Steps;
 #[cfg(feature = "papers")]
 pub use generated::{check_page, dance_page};
 #[cfg(feature = "papers")]
-pub use song::Sound;
+pub use song::{Sound, song_page};
 
 /// Index of the joint that carries the head.
 const HEAD: usize = 23;

@@ -78,7 +78,7 @@ fn embedded(file: &Path) -> Result<String, FileError> {
 ///
 /// # Errors
 /// A dance on another skeleton than the dance skeleton, a sound that the page cannot have.
-pub(super) fn song_page(
+pub fn song_page(
     model: &str,
     song: &Song,
     dance: &Clip,

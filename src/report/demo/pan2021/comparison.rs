@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use crate::evaluation::{ProtocolScores, TableRow};
-use crate::experiment::ExperimentConfig;
-use crate::report::{NO_TRAINING, schedule_note};
-use crate::run::Manifest;
+use crate::evaluation::ProtocolScores;
 
 /// Lengths of transition (frames) at which a model must be ahead: where the keyframes say little of
 /// the dance between them.
@@ -26,24 +23,6 @@ impl Comparison {
     pub fn is_ahead(&self) -> bool {
         self.long()
             .all(|(_, [model, untrained, other])| model < untrained && model < other)
-    }
-
-    /// The rows of the three in the tables, the model trained as config and manifest say.
-    pub fn rows(&self, config: &ExperimentConfig, manifest: &Manifest) -> [TableRow; 3] {
-        let row = |name: &str, seed, scores: &ProtocolScores, note: &str| TableRow {
-            name: format!("{name}, generated clips"),
-            seed,
-            scores: Some(scores.clone()),
-            schedule_note: note.into(),
-        };
-        let before = "the small whole model before its training";
-        let trained = schedule_note(config, manifest);
-        let seed = Some(manifest.seed);
-        [
-            row("interpolation", None, &self.interpolation, NO_TRAINING),
-            row("linear estimate", None, &self.untrained, before),
-            row("small whole model", seed, &self.model, &trained),
-        ]
     }
 
     /// Length, LRP (cm) of the model, of the model untrained and of interpolation.
