@@ -9,18 +9,22 @@ use clap::Args;
 use super::notice::warn;
 use super::threads::Threads;
 use crate::data::Dataset;
+use crate::experiment::EvaluatedRun;
 use crate::report::figures::{FigureRequest, drawing_of};
 use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
-/// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al.
+/// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al., 4
+/// to 9 of Pu and Shan
 ///
 /// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
 /// test clip: by default the one in the middle of the first clip by name. Captions and CSV files
 /// give means over such a transition of every test clip that is long enough. A model of Pan et al.
 /// follows a control where it gives at least a third of the change that is asked for; the captions
 /// of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al. need the rows
-/// mix_embedding and slerp, position_loss and contact_loss beside the model. Motion is shown as the
-/// model predicts it, neither bent onto the keyframes nor cleaned up.
+/// mix_embedding and slerp, position_loss and contact_loss beside the model. Figures 5 and 6 of Pu
+/// and Shan are over evaluated rows, figure 7 is of the model's own scores; figures 8 and 9 show the
+/// beginning of the first test clip by name. Motion is shown as the model predicts it, neither bent
+/// onto the keyframes nor cleaned up.
 #[derive(Debug, Args)]
 pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -36,13 +40,19 @@ pub struct FiguresArgs {
     /// repeated
     #[arg(long, value_name = "RUN_DIR_OR_CONFIG")]
     compare: Vec<PathBuf>,
+    /// Folder of evaluated rows, such as `keydance reproduce` writes: for figures 5 to 7 of Pu and
+    /// Shan
+    #[arg(long, value_name = "DIR")]
+    rows: Option<PathBuf>,
     /// Test clip to show, by its file name [default: the first by name]
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
-    /// First keyframe in that clip [default: the transition is in its middle]
+    /// First keyframe in that clip [default: the transition is in its middle]; first frame of the
+    /// dance for Pu and Shan [default: 0]
     #[arg(long, value_name = "FRAME")]
     start: Option<usize>,
-    /// Frames from keyframe to keyframe [default: 100 for Pan et al., 30 for Li et al.]
+    /// Frames from keyframe to keyframe [default: 100 for Pan et al., 30 for Li et al.]; of the
+    /// dance, with its seed, for Pu and Shan [default: 240]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=10_000))]
     length: Option<u16>,
     /// Show the transition in the motion viewer, too: one HTML page
@@ -67,7 +77,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let mut compared = compared.collect::<Result<Vec<_>, _>>()?;
     let models = || compared.iter().chain([&subject]);
     let inputs: Vec<PathBuf> = models().flat_map(Subject::files).collect();
-    let inputs = inputs.iter().chain([&args.data]);
+    let inputs = inputs.iter().chain([&args.data]).chain(&args.rows);
     check_outputs_beside(Some(&args.out), &args.viewer, inputs, args.force)?;
     check_output_folder(&args.out, args.force)?;
     let draw = drawing_of(&subject)?;
@@ -79,9 +89,14 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     for model in compared.iter_mut().chain([&mut subject]) {
         model.model.look_up_in(&dataset.train)?;
     }
+    let rows = match &args.rows {
+        Some(folder) => EvaluatedRun::rows_in(folder, (!args.other_data).then_some(&dataset))?,
+        None => Vec::new(),
+    };
     let asked = FigureRequest {
         subject: &subject,
         compared: &compared,
+        rows: &rows,
         dataset: &dataset,
         length: args.length.map(usize::from),
         clip: args.clip.as_deref(),
@@ -96,6 +111,9 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     let mut out = std::io::stdout();
     for figure in &drawn.figures {
         writeln!(out, "{}", figure.caption)?;
+    }
+    for sentence in &drawn.left_out {
+        writeln!(out, "{sentence}")?;
     }
     writeln!(out, "{}", args.out.display())?;
     Ok(())

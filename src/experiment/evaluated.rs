@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::{ExperimentConfig, ReproduceError};
 use crate::counted::counted;
+use crate::data::Dataset;
 use crate::evaluation::{EvaluationRecord, TableRow, Tables};
 use crate::report::{NO_TRAINING, schedule_note};
-use crate::run::{Manifest, RunFolder};
+use crate::run::{FileError, Manifest, RunFolder};
 
 /// A run with its scores.
 pub struct EvaluatedRun {
@@ -49,6 +50,40 @@ impl EvaluatedRun {
             }
         }
         Ok(runs)
+    }
+
+    /// Rows of the tables from a folder, by their folders' names: all that have scores there, such
+    /// as `keydance reproduce` wrote; on `data` where it is given.
+    ///
+    /// # Errors
+    /// There is none; as [`EvaluatedRun::tables`]; they were scored on other data.
+    pub fn rows_in(folder: &Path, data: Option<&Dataset>) -> Result<Vec<TableRow>, ReproduceError> {
+        let entries = std::fs::read_dir(folder).map_err(FileError::at(folder, "read"))?;
+        let mut folders: Vec<PathBuf> = entries
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.join(RunFolder::CONFIG).is_file() && EvaluationRecord::is_in(path))
+            .collect();
+        if folders.is_empty() {
+            return Err(ReproduceError::Refused(format!(
+                "{} holds no folder of a row with its scores; `keydance reproduce` writes such a \
+                 folder",
+                folder.display()
+            )));
+        }
+        folders.sort_unstable();
+        let runs = Self::read_all(&folders)?;
+        let scored = runs.first().map(|run| &run.record.data.data_digest);
+        if let Some((scored, data)) = scored.zip(data)
+            && *scored != data.digest
+        {
+            return Err(ReproduceError::Refused(format!(
+                "{} holds scores on data with digest {scored}, that of --data is {}; give \
+                 --other-data to show them all the same",
+                folder.display(),
+                data.digest
+            )));
+        }
+        Ok(runs.iter().map(Self::row).collect())
     }
 
     fn read(folder: &Path) -> Result<Self, ReproduceError> {

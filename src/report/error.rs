@@ -2,7 +2,7 @@
 
 use crate::data::choreography::ChoreographyError;
 use crate::data::{DataError, EmptyPart};
-use crate::evaluation::{EvaluationError, PrintedError};
+use crate::evaluation::{EvaluationError, PrintedError, RecordError};
 use crate::experiment::ConfigError;
 use crate::models::ModelError;
 use crate::models::settings::ValueError;
@@ -63,6 +63,12 @@ pub enum ReportError {
     Figure(#[from] FigureError),
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
+    #[error(transparent)]
+    Printed(#[from] PrintedError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
     #[cfg(feature = "papers")]
     #[error(transparent)]
     Synthesis(#[from] SynthesisError),
@@ -79,10 +85,6 @@ pub enum ReportError {
     Data(#[from] DataError),
     #[error(transparent)]
     EmptyPart(#[from] EmptyPart),
-    #[error(transparent)]
-    Evaluation(#[from] EvaluationError),
-    #[error(transparent)]
-    Printed(#[from] PrintedError),
     #[error(transparent)]
     Config(#[from] ConfigError),
     #[error(transparent)]

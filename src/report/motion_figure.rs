@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::FigureError;
 use super::dancer::{Drawn, DrawnBody, GENERATED, KEYFRAME, MARKED, RECORDED};
+use super::music_strip::{self, MusicStrip};
 use super::root_panel::{self, RootPaths};
 use super::svg::{Anchor, Font, Stroke, Svg, wrapped};
 use crate::motion::{JOINTS, PARTS};
@@ -13,6 +14,8 @@ const TOP: f64 = 74.0;
 const INK: &str = "#222222";
 /// Room between the last dancer and a panel of root trajectories, pixels.
 const GUTTER: f64 = 14.0;
+/// Room between a dancer and its frame, pixels.
+const FRAME_ROOM: f64 = 5.0;
 
 /// One row: a motion over the frames of the figure.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +30,11 @@ pub struct MotionRow {
     pub keyframes: Vec<usize>,
     /// Whether the frames between keyframes were generated (amber) or recorded (blue-grey).
     pub generated: bool,
+    /// So many frames at the beginning of a generated row are the recorded ones that it goes on
+    /// from.
+    pub seed: usize,
+    /// Frames whose poses were wanted: as generated or recorded, in a red frame, drawn always.
+    pub framed: Vec<usize>,
     /// Parts of the body in blue: those that were asked to move otherwise.
     pub marked: [bool; PARTS],
     /// Drawn in a panel at the end of the row.
@@ -38,6 +46,8 @@ pub struct MotionRow {
 pub enum Shown {
     /// Every few frames from the first on; 0 counts as 1.
     Every(usize),
+    /// The same from another one on.
+    From { first: usize, every: usize },
     /// So many, evenly from the first to the last.
     Count(usize),
 }
@@ -65,6 +75,8 @@ pub struct MotionFigure {
     pub rows: Vec<MotionRow>,
     pub shown: Shown,
     pub placing: Placing,
+    /// What is heard in the frames of the first row, over it.
+    pub music: Option<MusicStrip>,
 }
 
 impl MotionRow {
@@ -93,6 +105,8 @@ impl MotionRow {
             frames,
             keyframes: vec![0, last],
             generated,
+            seed: 0,
+            framed: Vec::new(),
             marked: [false; PARTS],
             paths: None,
         }
@@ -103,12 +117,14 @@ impl MotionRow {
         let frames = self.frames.len();
         let mut list: Vec<usize> = match shown {
             Shown::Every(step) => (0..frames).step_by(step.max(1)).collect(),
+            Shown::From { first, every } => (first..frames).step_by(every.max(1)).collect(),
             Shown::Count(count) => {
                 let steps = count.saturating_sub(1).max(1);
                 (0..count).map(|k| k * (frames - 1) / steps).collect()
             }
         };
-        list.extend(self.keyframes.iter().filter(|frame| **frame < frames));
+        let always = self.keyframes.iter().chain(&self.framed);
+        list.extend(always.filter(|frame| **frame < frames));
         list.sort_unstable();
         list.dedup();
         list
@@ -148,6 +164,7 @@ impl MotionFigure {
             rows,
             shown,
             placing: Placing::OnOwnPath,
+            music: None,
         }
     }
 
@@ -165,14 +182,20 @@ impl MotionFigure {
         let shared = rows.iter().all(|row| row.shown == rows[0].shown);
         let axis = if shared { 0.0 } else { 18.0 };
         let step = layout.row_height + axis;
-        let height = TOP + step * rows.len() as f64 + if shared { 34.0 } else { 16.0 };
+        let top = TOP + self.music.as_ref().map_or(0.0, |_| music_strip::HEIGHT);
+        let height = top + step * rows.len() as f64 + if shared { 34.0 } else { 16.0 };
         let paths = self.rows.iter().filter_map(|row| row.paths.as_ref());
         let span = paths.map(RootPaths::span).fold(0.0, f64::max);
 
         let mut svg = Svg::new(layout.width, height, &self.title);
         self.draw_heading(&mut svg);
+        if let Some(music) = &self.music {
+            draw_label(&mut svg, "Music", TOP + music_strip::HEIGHT / 2.0);
+            let ends = [rows[0].shown[0], rows[0].shown[rows[0].shown.len() - 1]];
+            music.draw(&mut svg, TOP, ends, |frame| rows[0].place(&layout, frame));
+        }
         for (index, placed) in rows.iter().enumerate() {
-            let ground = TOP + step * index as f64 + layout.above + 10.0;
+            let ground = top + step * index as f64 + layout.above + 10.0;
             svg.begin_group("row");
             let floor = layout.panel.0 - GUTTER;
             let line = [[LEFT, ground], [floor, ground]];
@@ -226,7 +249,7 @@ impl MotionFigure {
         let empty = |what| FigureError::empty(&self.title, what);
         let first = self.rows.first().ok_or_else(|| empty("no rows"))?;
         for row in &self.rows {
-            if row.frames.is_empty() {
+            if row.frames.is_empty() || row.shown(self.shown).is_empty() {
                 return Err(empty("no frames"));
             }
             if self.placing == Placing::OnFirstPath && row.frames.len() != first.frames.len() {
@@ -257,7 +280,11 @@ impl MotionFigure {
         );
         let entries = [
             (KEYFRAME, "keyframe (given)", given),
-            (RECORDED, "recorded", any(|row| !row.generated)),
+            (
+                RECORDED,
+                "recorded",
+                any(|row| !row.generated || row.seed > 0),
+            ),
             (GENERATED, "generated", any(|row| row.generated)),
             (MARKED, "asked to move faster", marked),
         ];
@@ -266,6 +293,12 @@ impl MotionFigure {
         for (palette, name, _) in entries.iter().filter(|entry| entry.2) {
             let outline = Stroke::solid(palette.outline, 1.2);
             svg.circle([x, 49.0], 6.0, palette.fill, outline);
+            svg.text([x + 12.0, 53.0], name, font);
+            x += 40.0 + 7.0 * name.len() as f64;
+        }
+        if any(|row| !row.framed.is_empty()) {
+            draw_frame(svg, [x - 6.0, 43.0], [x + 6.0, 55.0]);
+            let name = "key pose (given)";
             svg.text([x + 12.0, 53.0], name, font);
             x += 40.0 + 7.0 * name.len() as f64;
         }
@@ -320,7 +353,8 @@ impl PlacedRow<'_> {
     fn draw(&self, svg: &mut Svg, layout: &Layout, ground: f64) {
         for (column, (dancer, frame)) in self.dancers.iter().zip(&self.shown).enumerate() {
             let given = self.row.keyframes.contains(frame);
-            let (class, palette) = match (given, self.row.generated) {
+            let generated = self.row.generated && *frame >= self.row.seed;
+            let (class, palette) = match (given, generated) {
                 (true, _) => ("keyframe", KEYFRAME),
                 (false, true) => ("generated", GENERATED),
                 (false, false) => ("recorded", RECORDED),
@@ -330,7 +364,23 @@ impl PlacedRow<'_> {
             svg.begin_group(class);
             dancer.draw(svg, place, palette, marked);
             svg.end_group();
+            if self.row.framed.contains(frame) {
+                let [x, y] = place;
+                let corner = [x - dancer.left, y - dancer.above].map(|it| it - FRAME_ROOM);
+                let opposite = [x + dancer.right, y + dancer.below].map(|it| it + FRAME_ROOM);
+                draw_frame(svg, corner, opposite);
+            }
         }
+    }
+
+    /// Where a frame stands across, by the columns around it.
+    fn place(&self, layout: &Layout, frame: usize) -> f64 {
+        let last = self.shown.len() - 1;
+        let next = self.shown.partition_point(|&it| it < frame).min(last);
+        let before = next.saturating_sub(1);
+        let [from, to] = [before, next].map(|column| self.shown[column] as f64);
+        let share = (frame as f64 - from) / (to - from).max(1.0);
+        layout.start + layout.spacing * (before as f64 + share)
     }
 
     /// The numbers of the frames under their dancers.
@@ -339,13 +389,27 @@ impl PlacedRow<'_> {
         svg.text([LEFT - 14.0, foot], "frame", font);
         for (column, frame) in self.shown.iter().enumerate() {
             let mut font = Font::new(12.0, INK, Anchor::Middle);
-            if self.row.keyframes.contains(frame) {
+            if self.row.keyframes.contains(frame) || self.row.framed.contains(frame) {
                 (font.colour, font.bold) = (KEYFRAME.fill, true);
             }
             let place = [layout.start + layout.spacing * column as f64, foot];
             svg.text(place, &frame.to_string(), font);
         }
     }
+}
+
+/// The red frame of a key pose.
+fn draw_frame(svg: &mut Svg, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) {
+    let corners = [
+        [left, top],
+        [right, top],
+        [right, bottom],
+        [left, bottom],
+        [left, top],
+    ];
+    svg.begin_group("framed");
+    svg.line(&corners, Stroke::solid(KEYFRAME.fill, 1.8));
+    svg.end_group();
 }
 
 /// A row's label, one line a word group of at most 14 characters.

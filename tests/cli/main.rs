@@ -36,5 +36,6 @@ mod report;
 mod reproduce;
 mod rotations;
 mod song;
+mod song_figures;
 mod stopped;
 mod viewer;

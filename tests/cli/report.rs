@@ -41,6 +41,7 @@ fn figure() -> MotionFigure {
         caption: String::new(),
         shown: Shown::Every(6),
         placing: Placing::OnFirstPath,
+        music: None,
     }
 }
 

@@ -23,11 +23,11 @@ const CONFIG: &str = "name = 'pu'\n[data]\nsplit = { share = 0.8 }\nmusic = true
     [schedule]\nsteps = 4\nbatch_size = 2\nkey_poses = 2\n";
 
 /// Five dances of 240 frames with music in `data`, and a run.
-struct Fixture {
+pub struct Fixture {
     folder: TempDir,
 }
 
-static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
+pub static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
     let folder = TempDir::new().unwrap();
     let fixture = Fixture { folder };
     let mut command = fixture.command("choreography");
@@ -40,12 +40,12 @@ static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
 });
 
 impl Fixture {
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// With a cache of its own.
-    fn command(&self, name: &str) -> Command {
+    pub fn command(&self, name: &str) -> Command {
         let mut command = keydance(name);
         command.env("XDG_CACHE_HOME", self.path("cache"));
         command

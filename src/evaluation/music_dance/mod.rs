@@ -41,6 +41,7 @@ use request::request;
 use window::{Body, Character, Errors};
 
 pub use paper::PU2022;
+pub use request::{SEED, key_frames};
 
 /// The rate of motion and music that every speed is told by.
 const FRAMES_PER_SECOND: f64 = crate::music::FRAME_RATE;
@@ -115,12 +116,9 @@ struct Asked<'d> {
 
 impl Asked<'_> {
     fn request(&self, clip: usize, stretch: Range<usize>) -> Result<Request, EvaluationError> {
-        let recording = &self.recordings[clip];
-        let reads_music = self.model.needs().reads(Condition::Music);
-        let music = reads_music.then(|| self.model.music_features());
         // A draw of its own for every window, whatever else is scored.
         let seed = ((clip as u64) << 32) | stretch.start as u64;
-        request(recording, stretch, music, seed).ok_or_else(|| no_music(recording))
+        window_question(self.model, &self.recordings[clip], stretch, seed)
     }
 
     fn answers(&self, asked: &[(usize, Range<usize>)]) -> Result<Vec<Answer>, EvaluationError> {
@@ -190,6 +188,22 @@ impl Asked<'_> {
         }
         Ok(sum)
     }
+}
+
+/// What a model is asked about frames of a recording, as the protocol asks: the poses of the seed
+/// and of the key frames, and the music where it reads it. The recording must have the frames.
+///
+/// # Errors
+/// The recording has no music.
+pub fn window_question(
+    model: &dyn Generator,
+    recording: &Recording,
+    frames: Range<usize>,
+    seed: u64,
+) -> Result<Request, EvaluationError> {
+    let reads_music = model.needs().reads(Condition::Music);
+    let music = reads_music.then(|| model.music_features());
+    request(recording, frames, music, seed).ok_or_else(|| no_music(recording))
 }
 
 impl Protocol for MusicDance {

@@ -9,12 +9,12 @@ use crate::models::generator::{Given, Request};
 use crate::music::FeatureSet;
 
 /// T', frames of the seed.
-pub(super) const SEED: usize = 60;
+pub const SEED: usize = 60;
 /// Frames from the seed's last to the first key pose, and from one to the next.
 const KEY_EVERY: usize = 45;
 
 /// Frames of a stretch of `frames` at which key poses are given, from 0: 104, 149, 194, ...
-pub(super) fn key_frames(frames: usize) -> impl Iterator<Item = usize> {
+pub fn key_frames(frames: usize) -> impl Iterator<Item = usize> {
     (SEED - 1 + KEY_EVERY..frames).step_by(KEY_EVERY)
 }
 

@@ -6,6 +6,8 @@ pub mod li2023;
 mod numbers;
 #[cfg(feature = "papers")]
 pub mod pan2021;
+#[cfg(feature = "papers")]
+pub mod pu2022;
 
 pub use numbers::Numbers;
 
@@ -14,6 +16,7 @@ use std::path::Path;
 use super::{MotionFigure, ReportError};
 use crate::counted::counted;
 use crate::data::Dataset;
+use crate::evaluation::TableRow;
 use crate::run::{FileError, Subject, replace_file};
 
 /// Draws the figures of a paper: a line of [`crate::models::Paper`].
@@ -25,6 +28,8 @@ pub struct FigureRequest<'a> {
     pub subject: &'a Subject,
     /// Models to set beside it.
     pub compared: &'a [Subject],
+    /// Evaluated rows of a table, for figures over several.
+    pub rows: &'a [TableRow],
     /// Test clips are drawn and measured.
     pub dataset: &'a Dataset,
     /// Frames of what is shown from keyframe to keyframe [default: the paper's].
@@ -37,9 +42,28 @@ pub struct FigureRequest<'a> {
     pub page: bool,
 }
 
+impl FigureRequest<'_> {
+    /// Refuses rows where no figure of the paper is over rows.
+    ///
+    /// # Errors
+    /// There are some.
+    fn without_rows(&self) -> Result<(), ReportError> {
+        match self.rows {
+            [] => Ok(()),
+            _ => Err(ReportError::Refused(
+                "--rows is for figures over rows of a table, of which this model's paper has none; \
+                 leave it out"
+                    .into(),
+            )),
+        }
+    }
+}
+
 /// Figures, and the viewer's page where it was wanted.
 pub struct DrawnFigures {
     pub figures: Vec<Figure>,
+    /// Which figures there are not, and why: a sentence each.
+    pub left_out: Vec<String>,
     /// HTML.
     pub page: Option<String>,
 }
@@ -78,7 +102,7 @@ impl DrawnFigures {
         for figure in &self.figures {
             figure.write(folder)?;
         }
-        let index = index(&self.figures, &subject);
+        let index = index(&self.figures, &self.left_out, &subject);
         Ok(replace_file(&folder.join("index.md"), index)?)
     }
 }
@@ -124,12 +148,15 @@ impl Figure {
 }
 
 /// The page that shows all figures with their captions, Markdown.
-fn index(figures: &[Figure], subject: &str) -> String {
+fn index(figures: &[Figure], left_out: &[String], subject: &str) -> String {
     let mut text = format!("# The paper's figures\n\n{subject}\n");
     for Figure { name, caption, .. } in figures {
         let caption = caption.replace('[', "(").replace(']', ")");
         text +=
             &format!("\n![{caption}]({name}.svg)\n\n{caption} Numbers: [{name}.csv]({name}.csv)\n");
+    }
+    for sentence in left_out {
+        text += &format!("\n{sentence}\n");
     }
     text
 }

@@ -54,6 +54,20 @@ impl Numbers {
         self.push(row, measure.into(), place, value, "");
     }
 
+    /// A measure of a generated motion, frame by frame from `first` on.
+    pub fn add_series(
+        &mut self,
+        row: &str,
+        measure: &str,
+        first: usize,
+        values: &[f64],
+        unit: &'static str,
+    ) {
+        for (frame, &value) in (first..).zip(values) {
+            self.push(row, measure.into(), ("", Some(frame)), value, unit);
+        }
+    }
+
     /// Velocity factors of a generated motion, frame by frame.
     pub fn add_factor_series(&mut self, row: &str, factors: &[[f64; PARTS]]) {
         for (frame, factors) in factors.iter().enumerate().skip(1) {

@@ -114,6 +114,7 @@ impl<'d> Showcase<'d> {
             rows: rows.collect(),
             shown: Shown::Every(EVERY),
             placing: Placing::OnFirstPath,
+            music: None,
         }
         .svg()
     }

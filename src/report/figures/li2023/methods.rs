@@ -44,6 +44,7 @@ fn side_by_side(
         rows,
         shown: Shown::Every(every),
         placing: Placing::OnFirstPath,
+        music: None,
     };
     Figure::of_dancers(name, drawing, numbers)
 }
@@ -131,6 +132,7 @@ pub fn figure_6(stage: &Stage, cast: &Cast<'_>, frames: usize) -> Result<Figure,
         rows,
         shown: Shown::Every(2),
         placing: Placing::OnFirstPath,
+        music: None,
     };
     Figure::of_dancers("figure_6", drawing, numbers)
 }

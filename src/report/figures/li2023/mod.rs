@@ -29,6 +29,7 @@ pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
                 .into(),
         ));
     }
+    asked.without_rows()?;
     let data = &asked.subject.config.data;
     for other in asked.compared {
         let theirs = &other.config.data;
@@ -61,6 +62,7 @@ pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
     figures.push(contacts::figure_10(&stage, asked.dataset, model, frames)?);
     Ok(DrawnFigures {
         figures,
+        left_out: Vec::new(),
         page: None,
     })
 }

@@ -98,6 +98,7 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError
         rows,
         shown: Shown::Every(EVERY),
         placing: Placing::OnFirstPath,
+        music: None,
     };
     Figure::of_dancers("figure_12", drawing, numbers)
 }

@@ -23,6 +23,7 @@ use stage::Stage;
 /// Models that were made for other features of the data cannot be compared; the shown clip is not
 /// there; a model fails.
 pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
+    asked.without_rows()?;
     let data = &asked.subject.config.data;
     for other in asked.compared {
         let theirs = &other.config.data;
@@ -48,6 +49,7 @@ pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
     };
     Ok(DrawnFigures {
         figures: cast.figures(&stage)?,
+        left_out: Vec::new(),
         page: asked.page.then(|| cast.page(&stage)).transpose()?,
     })
 }
