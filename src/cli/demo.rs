@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context as _, bail};
 use clap::Args;
 
 use super::notice::notice;
@@ -16,10 +15,9 @@ use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::counted::counted;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::{PrintedTables, ProtocolScores, TableRow, Tables};
-use crate::models::{Generator, registry};
-use crate::report::demo::{self, Demo, DemoOptions, Losses, OpenDemo, OtherScores};
-use crate::report::{schedule_note, thousands};
+use crate::models::Generator;
+use crate::report::demo::{self, Demo, DemoOptions, Losses};
+use crate::report::thousands;
 use crate::run::RunFolder;
 use crate::training::Trainer;
 
@@ -57,7 +55,7 @@ pub struct DemoArgs {
 /// There is no such demo, the folder holds something else, or a file cannot be written.
 pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let begun = Instant::now();
-    let demo = opener(args.paper.as_deref())?(&DemoOptions {
+    let demo = demo::opener(args.paper.as_deref())?(&DemoOptions {
         reduced: args.reduced,
         fraction: args.fraction,
     })?;
@@ -76,66 +74,22 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let (untrained, losses) = train(demo, &dataset, args.threads.count(), &run)?;
     demo::write_losses(run.path(), &losses)?;
 
-    let model = run.trained_model(config)?;
-    let pool = args.threads.pool()?;
-    // The first one alone: a paper's numbers are of other data, so how it counted adds nothing.
-    let protocols = &config.protocols()[..1];
-    let protocol = &*protocols[0];
-    let evaluate = |model: &dyn Generator| {
+    let (model, pool) = (run.trained_model(config)?, args.threads.pool()?);
+    let models = (untrained, &*model);
+    let (tables, verdict) = demo::compare(demo, &dataset, &run, models, |protocol, model| {
         let part = DataPart::Test;
         pool.install(|| evaluate_watched(protocol, model, &dataset, part, true, None))
-            .map(|evaluated| ProtocolScores::new([(protocol.name(), evaluated.scores)]))
-    };
-    let row = |title: &str, seed, scores: &ProtocolScores, note: String| TableRow {
-        name: format!("{title}, generated clips"),
-        seed,
-        scores: Some(scores.clone()),
-        schedule_note: note,
-    };
-    let (mut rows, mut others) = (Vec::new(), OtherScores::default());
-    for other in demo.others(untrained) {
-        let scores = evaluate(&*other.model)?;
-        rows.push(row(other.title, None, &scores, other.note.into()));
-        others.0.push((other.file, scores));
-    }
-    let scores = evaluate(&*model)?;
-    let manifest = run.manifest()?.context("the training left no manifest")?;
-    let note = schedule_note(config, &manifest);
-    rows.push(row(demo.model_title(), Some(manifest.seed), &scores, note));
-    let printed = &match demo.metrics() {
-        [] => config.printed()?,
-        metrics => PrintedTables::of_metrics(metrics),
-    };
-    let tables = Tables { protocols, printed };
-    write!(out, "\n{}\n", tables.terminal(&rows))?;
-    demo::write_scores(run.path(), demo, &dataset, &scores, &others, tables, &rows)?;
-
+    })?;
+    write!(out, "\n{tables}\n")?;
     writeln!(out, "{}", demo.show(&*model, &dataset, run.path())?)?;
     let seconds = begun.elapsed().as_secs_f64();
     writeln!(out, "{} in {seconds:.0} s", run.path().display())?;
-    let verdict = demo.verdict(&scores, &others);
     writeln!(out, "{}", verdict.numbers)?;
     if verdict.reached {
         return Ok(ExitCode::SUCCESS);
     }
     notice(format_args!("error: {}", verdict.missed));
     Ok(ExitCode::from(MISSED))
-}
-
-/// What opens the demo of a paper; without a name, of the first that has one.
-fn opener(paper: Option<&str>) -> anyhow::Result<OpenDemo> {
-    let papers = registry::papers().into_iter();
-    let demos = papers.filter_map(|paper| Some((paper.name, paper.demo?)));
-    let demos: Vec<(&str, OpenDemo)> = demos.collect();
-    let mut wanted = demos.iter();
-    match wanted.find(|(name, _)| paper.is_none_or(|paper| paper == *name)) {
-        Some((_, open)) => Ok(*open),
-        None => {
-            let known: Vec<&str> = demos.iter().map(|(name, _)| *name).collect();
-            let (paper, known) = (paper.unwrap_or_default(), known.join(", "));
-            bail!("--paper {paper}: no such paper has a demo; these have one: {known}")
-        }
-    }
 }
 
 /// Trains to the end of the schedule and shows the progress on stderr. The model with its initial

@@ -12,13 +12,16 @@ pub use losses::Losses;
 
 use std::path::Path;
 
-use super::{ReportError, thousands};
+use super::{ReportError, schedule_note, thousands};
 use crate::counted::counted;
 use crate::data::choreography::ChoreographyConfig;
 use crate::data::{DataPart, Dataset, Recording};
-use crate::evaluation::{EvaluatedData, EvaluationRecord, ProtocolScores, TableRow, Tables};
+use crate::evaluation::{
+    EvaluatedData, Evaluation, EvaluationError, EvaluationRecord, PrintedTables, Protocol,
+    ProtocolScores, TableRow, Tables,
+};
 use crate::experiment::ExperimentConfig;
-use crate::models::Generator;
+use crate::models::{Generator, registry};
 use crate::run::{RunFolder, check_output_folder, remove_file, replace_file, write_json};
 
 const TABLES: &str = "tables.md";
@@ -113,6 +116,25 @@ pub struct Verdict {
     pub missed: &'static str,
 }
 
+/// What opens the demo of a paper; without a name, of the first that has one.
+///
+/// # Errors
+/// No such paper has a demo.
+pub fn opener(paper: Option<&str>) -> Result<OpenDemo, ReportError> {
+    let papers = registry::papers().into_iter();
+    let demos = papers.filter_map(|paper| Some((paper.name, paper.demo?)));
+    let demos: Vec<(&str, OpenDemo)> = demos.collect();
+    let mut wanted = demos.iter();
+    let found = wanted.find(|(name, _)| paper.is_none_or(|paper| paper == *name));
+    found.map(|(_, open)| *open).ok_or_else(|| {
+        let known: Vec<&str> = demos.iter().map(|(name, _)| *name).collect();
+        let (paper, known) = (paper.unwrap_or_default(), known.join(", "));
+        ReportError::Refused(format!(
+            "--paper {paper}: no such paper has a demo; these have one: {known}"
+        ))
+    })
+}
+
 /// Refuses a folder that holds something else than an earlier demo.
 ///
 /// # Errors
@@ -154,19 +176,50 @@ pub fn write_losses(folder: &Path, losses: &Losses) -> Result<(), ReportError> {
     Ok(replace_file(&folder.join(LOSS_CURVE), losses.figure()?)?)
 }
 
-/// Writes tables, the scores of the model and of the others by their files.
+/// Scores the trained model of a run and what stands beside it, and writes tables and scores; the
+/// tables for the terminal, and whether the demo's goal is reached. `untrained`: the model before
+/// its training; `evaluate` scores a model on the test clips.
 ///
 /// # Errors
-/// A file cannot be written.
-pub fn write_scores(
-    folder: &Path,
+/// A model that cannot be scored, or a file that cannot be written.
+pub fn compare(
     demo: &dyn Demo,
     dataset: &Dataset,
-    model: &ProtocolScores,
-    others: &OtherScores,
-    tables: Tables<'_>,
-    rows: &[TableRow],
-) -> Result<(), ReportError> {
+    run: &RunFolder,
+    (untrained, model): (Box<dyn Generator>, &dyn Generator),
+    evaluate: impl Fn(&dyn Protocol, &dyn Generator) -> Result<Evaluation, EvaluationError>,
+) -> Result<(String, Verdict), ReportError> {
+    let (config, folder) = (demo.experiment(), run.path());
+    // The first one alone: a paper's numbers are of other data, so how it counted adds nothing.
+    let protocols = &config.protocols()[..1];
+    let protocol = &*protocols[0];
+    let evaluate = |model: &dyn Generator| -> Result<ProtocolScores, EvaluationError> {
+        let scores = evaluate(protocol, model)?.scores;
+        Ok(ProtocolScores::new([(protocol.name(), scores)]))
+    };
+    let row = |title: &str, seed, scores: &ProtocolScores, note: String| TableRow {
+        name: format!("{title}, generated clips"),
+        seed,
+        scores: Some(scores.clone()),
+        schedule_note: note,
+    };
+    let (mut rows, mut others) = (Vec::new(), OtherScores::default());
+    for other in demo.others(untrained) {
+        let scores = evaluate(&*other.model)?;
+        write_json(&folder.join(other.file), &scores)?;
+        rows.push(row(other.title, None, &scores, other.note.into()));
+        others.0.push((other.file, scores));
+    }
+    let scores = evaluate(model)?;
+    let none = || ReportError::Refused("the training left no manifest".into());
+    let manifest = run.manifest()?.ok_or_else(none)?;
+    let note = schedule_note(config, &manifest);
+    rows.push(row(demo.model_title(), Some(manifest.seed), &scores, note));
+    let printed = &match demo.metrics() {
+        [] => config.printed()?,
+        metrics => PrintedTables::of_metrics(metrics),
+    };
+    let tables = Tables { protocols, printed };
     let choreography = demo.choreography();
     let subject = format!(
         "{} of {} of {} (seed {})",
@@ -175,16 +228,11 @@ pub fn write_scores(
         counted(choreography.frames_per_clip, "frame"),
         choreography.seed
     );
-    replace_file(&folder.join(TABLES), tables.markdown(rows, &subject))?;
-    for (file, scores) in &others.0 {
-        write_json(&folder.join(file), scores)?;
-    }
-    EvaluationRecord {
-        scores: model.clone(),
-        data: EvaluatedData::of(dataset, DataPart::Test)?,
-    }
-    .write(folder)?;
-    Ok(())
+    replace_file(&folder.join(TABLES), tables.markdown(&rows, &subject))?;
+    let verdict = demo.verdict(&scores, &others);
+    let data = EvaluatedData::of(dataset, DataPart::Test)?;
+    EvaluationRecord { scores, data }.write(folder)?;
+    Ok((tables.terminal(&rows), verdict))
 }
 
 /// The data in words.
