@@ -15,7 +15,7 @@ use super::file_units::FileUnits;
 use super::notice::warn;
 use crate::data::Dataset;
 use crate::motion::bvh;
-use crate::report::viewer::{check_page, dance_page};
+use crate::report::viewer::dance_page;
 use crate::run::{Subject, beside_clips, check_outputs, replace_file, write_json};
 use crate::synthesis::{ContactSequence, Dance, DanceRequest, SynthesisOptions};
 use keyframes::KeyframeArgs;
@@ -118,19 +118,15 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
     subject.check_no_clip(&args.out)?;
     warn(beside_clips(&args.out, &inputs));
-    if args.viewer.is_some() {
-        check_page(&subject, &request, &args.out)?;
-    }
     if let Some(folder) = &args.data {
         let dataset = Dataset::load(folder, &subject.config.data)?;
         warn(&dataset.warnings);
         subject.model.look_up_in(&dataset.train)?;
     }
     let dance = Dance::make(&subject, &request, &data, &mut |notice| warn([notice]))?;
-    let page = match &args.viewer {
-        Some(path) => dance_page(&subject, &dance, &data, args.song.sound(path))?,
-        None => None,
-    };
+    let page = args.viewer.as_ref();
+    let page = page.map(|path| dance_page(&subject, &dance, &data, args.song.sound(path)));
+    let page = page.transpose()?;
     bvh::write(&args.out, &dance.document)?;
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
         replace_file(path, page)?;

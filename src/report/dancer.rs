@@ -62,7 +62,7 @@ impl DrawnBody {
             Some(Bone {
                 joint,
                 parent: parent?,
-                width: bone_width(name),
+                width: SCALE * bone_thickness(name),
                 part: part_of(name),
             })
         };
@@ -141,14 +141,14 @@ fn seen(place: DVec3) -> ([f64; 2], f64) {
 /// Radius of the head, pixels.
 const HEAD: f64 = 8.0;
 
-/// Width of the bone that ends at a joint of this name, pixels: the spine is thicker than the
+/// Thickness of the bone that ends at a joint of this name, cm: the spine is thicker than the
 /// limbs, the ends of limbs thinner.
-fn bone_width(joint: &str) -> f64 {
+pub(super) fn bone_thickness(joint: &str) -> f64 {
     match joint {
-        _ if joint.starts_with("Spine") => 7.6,
-        _ if joint.ends_with("Leg") => 6.4,
-        _ if joint.contains("Toe") || joint.ends_with("Hand") => 4.0,
-        _ => 5.2,
+        _ if joint.starts_with("Spine") => 9.0,
+        _ if joint.ends_with("Leg") => 7.6,
+        _ if joint.contains("Toe") || joint.ends_with("Hand") => 5.0,
+        _ => 6.4,
     }
 }
 

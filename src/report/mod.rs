@@ -32,4 +32,6 @@ pub use schedule_note::{NO_TRAINING, schedule_note};
 pub use score_figure::{ScoreSeries, score_curve, score_figure};
 pub use thousands::thousands;
 pub use training_curves::{LossSeries, loss_curve, validation_curve};
-pub use viewer::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion, ViewerMusic};
+pub use viewer::{
+    Asked, MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion, ViewerMusic,
+};

@@ -14,6 +14,7 @@ use tempfile::TempDir;
 
 use crate::generated_data::write_clips;
 use crate::trained_run::keydance;
+use crate::viewer_page::page_data;
 
 const LI: &str = "name = 'li'\n[data]\nsplit = { share = 0.8 }\n\
     [model]\nkind = 'li2023'\nwidth = 4\nheads = 2\nlayers = 2\n\
@@ -136,9 +137,12 @@ fn the_standing_foot_stands_still_and_keyframes_keep_their_poses() {
     let out = folder.path().join("dance.bvh");
     let json = folder.path().join("dance.json");
     let mut command = FIXTURE.generate("li", "20,44,80", &out);
+    let page = folder.path().join("dance.html");
     command
         .args(["--contacts", "left:0-9,right:10-24,both:25-60", "--json"])
-        .arg(&json);
+        .arg(&json)
+        .arg("--viewer")
+        .arg(&page);
     command
         .assert()
         .success()
@@ -168,6 +172,22 @@ fn the_standing_foot_stands_still_and_keyframes_keep_their_poses() {
     let found = dance.poses[24].translations[0].distance(recorded.poses[44].translations[0]);
     assert!((gap - found).abs() < 1e-6, "{gap} {found}");
     assert_eq!(summary["units"]["root_gap"], "cm");
+    // The page has the keyframes, in each frame one foot by its ankle and toe, and no body parts.
+    let shown = page_data(&fs::read_to_string(&page).unwrap());
+    let keyframes = shown["keyframes"].as_array().unwrap().iter();
+    assert!(
+        keyframes
+            .map(|it| it["frame"].as_u64().unwrap())
+            .eq([0, 24, 60])
+    );
+    let contacts = shown["motions"][0]["contacts"].as_array().unwrap().iter();
+    let contacts: Vec<u64> = contacts.map(|it| it.as_u64().unwrap()).collect();
+    assert_eq!(contacts.len(), 61);
+    assert!(
+        contacts.iter().all(|feet| [0b0011, 0b1100].contains(feet)),
+        "{contacts:?}"
+    );
+    assert_eq!(shown["parts"], serde_json::json!([]));
 }
 
 #[test]

@@ -15,7 +15,10 @@ use keydance::models::transition::window_features;
 use keydance::models::transition::{DanceClip, TransitionRequest};
 use keydance::motion::JOINTS;
 use keydance::motion::placement::world_positions;
-use keydance::report::{Asked, FigureError, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
+use keydance::motion::skeleton::{Joint, Skeleton};
+use keydance::report::{
+    Asked, FigureError, MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion,
+};
 use ndarray::{Axis, concatenate, s};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -47,6 +50,7 @@ fn viewer() -> Viewer {
     Viewer {
         title: "waltz.bvh, frames 20 to 270".into(),
         frame_time: 1.0 / 30.0,
+        body: ViewerBody::dance(),
         motions: vec![
             motion("Ground truth", MotionKind::Recorded, window.view()),
             motion("Interpolation", MotionKind::Other, interpolated.view()),
@@ -55,7 +59,7 @@ fn viewer() -> Viewer {
         keyframes: [0, LENGTH]
             .map(|frame| ViewerKeyframe {
                 frame,
-                positions: world_positions(window.row(frame)),
+                positions: world_positions(window.row(frame)).to_vec(),
             })
             .to_vec(),
         asked: Some(Asked::new(
@@ -205,11 +209,12 @@ fn positions_come_back_to_half_a_step_however_wide_the_motion() {
             let depth = -width * share * share;
             DVec3::new(width * share - 7.0, 90.0 - 0.3 * share, depth)
         };
-        let body = |time: usize| std::array::from_fn(|joint| place(time * JOINTS + joint));
-        let frames: Vec<[DVec3; JOINTS]> = (0..20).map(body).collect();
+        let body = |time| (0..JOINTS).map(move |joint| place(time * JOINTS + joint));
+        let frames: Vec<Vec<DVec3>> = (0..20).map(|time| body(time).collect()).collect();
         let viewer = Viewer {
             title: "wide".into(),
             frame_time: 1.0 / 30.0,
+            body: ViewerBody::dance(),
             motions: vec![ViewerMotion {
                 name: "Model".into(),
                 kind: MotionKind::Model,
@@ -231,4 +236,46 @@ fn positions_come_back_to_half_a_step_however_wide_the_motion() {
             assert!(apart <= 0.51 * step, "{expected} {found}");
         }
     }
+}
+
+#[test]
+fn a_body_of_any_joints_is_drawn_and_a_pose_of_others_is_refused() {
+    let joint = |name: &str, parent: Option<usize>| Joint {
+        name: name.into(),
+        parent,
+        offset: DVec3::Y,
+        end_sites: Vec::new(),
+    };
+    let joints = vec![
+        joint("Hips", None),
+        joint("Spine", Some(0)),
+        joint("Head", Some(1)),
+    ];
+    let skeleton = Skeleton { joints };
+    let viewer = |positions: Vec<Vec<DVec3>>| Viewer {
+        title: "three".into(),
+        frame_time: 1.0 / 30.0,
+        body: ViewerBody::of(&skeleton),
+        motions: vec![ViewerMotion {
+            name: "Model".into(),
+            kind: MotionKind::Model,
+            contacts: vec![[false; 4]; positions.len()],
+            velocity_factors: Vec::new(),
+            positions,
+        }],
+        keyframes: Vec::new(),
+        asked: None,
+        music: None,
+    };
+    let data = page_data(&viewer(vec![vec![DVec3::ZERO; 3]; 2]).html().unwrap());
+    assert_eq!(data["parents"], serde_json::json!([-1, 0, 1]));
+    assert_eq!(data["head"], 2);
+    assert_eq!(data["feet"], serde_json::json!([]));
+    let error = viewer(vec![vec![DVec3::ZERO; 4]; 2]).html().unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("a pose of 4 joints is none of a body of 3"),
+        "{error}"
+    );
 }

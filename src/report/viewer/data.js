@@ -44,8 +44,9 @@ motions.forEach((motion) => (motion.root = rootPath(motion)));
 /** The floor: where the lowest foot of the first motion stands. */
 const floor = (() => {
   const heights = [];
+  const lowest = data.feet.length ? data.feet : data.parents.map((_, joint) => joint);
   for (let frame = 0; frame < data.frames; frame++) {
-    heights.push(Math.min(...data.feet.map((joint) => motions[0].positions[(frame * JOINTS + joint) * 3 + 1])));
+    heights.push(Math.min(...lowest.map((joint) => motions[0].positions[(frame * JOINTS + joint) * 3 + 1])));
   }
   heights.sort((a, b) => a - b);
   return heights[Math.floor(heights.length * 0.05)];

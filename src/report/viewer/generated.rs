@@ -1,31 +1,30 @@
 //! Pages of motions that were made from a request.
 
-use std::path::Path;
-
 use ndarray::ArrayView2;
 
 use super::song::{Sound, song_page};
-use super::{Asked, MotionKind, Viewer, ViewerKeyframe, ViewerMotion};
+use super::{Asked, MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion};
 use crate::data::DataConfig;
 use crate::models::ModelKind as _;
 use crate::models::baselines::interpolation::Interpolation;
-use crate::models::generator::NeededPoses;
 use crate::models::transition::Kind;
 use crate::motion::placement::world_positions;
-use crate::report::ReportError;
+use crate::motion::{Foot, Pose};
+use crate::report::{FigureError, ReportError};
 use crate::run::Subject;
-use crate::synthesis::{Dance, DanceRequest, MadeSequence, Origin, SequenceRequest, synthesise};
+use crate::synthesis::{Completion, Dance, MadeSequence, Origin, SequenceRequest, synthesise};
 
 impl Viewer {
     /// Motions with the keyframes and the controls of the request that they were made from.
     pub fn of_request(title: &str, request: &SequenceRequest, motions: Vec<ViewerMotion>) -> Self {
         let keyframes = request.keyframes.iter().map(|timed| ViewerKeyframe {
             frame: timed.time,
-            positions: world_positions(timed.keyframe.features.view()),
+            positions: world_positions(timed.keyframe.features.view()).to_vec(),
         });
         Self {
             title: title.into(),
             frame_time: request.frame_time,
+            body: ViewerBody::dance(),
             motions,
             keyframes: keyframes.collect(),
             asked: Some(Asked::new(
@@ -37,29 +36,7 @@ impl Viewer {
     }
 }
 
-/// Refuses a page of what a model makes on whatever skeleton: a page shows the dance skeleton.
-/// `file`: where its motion goes.
-///
-/// # Errors
-/// The model makes rotations between keyframes.
-pub fn check_page(
-    subject: &Subject,
-    request: &DanceRequest,
-    file: &Path,
-) -> Result<(), ReportError> {
-    match subject.model.needs().poses {
-        NeededPoses::Keyframes { .. } if request.song.is_none() => {
-            Err(ReportError::Refused(format!(
-                "--viewer shows motions of the dance skeleton by models of transitions; leave it \
-                 out and open {} in any viewer of BVH",
-                file.display()
-            )))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The page of a dance, HTML; none of a model for which [`check_page`] refuses it.
+/// The page of a dance, HTML.
 ///
 /// # Errors
 /// Interpolation cannot be asked, the song cannot be named, or the page has nothing to show.
@@ -68,14 +45,44 @@ pub fn dance_page(
     dance: &Dance,
     data: &DataConfig,
     sound: Sound<'_>,
-) -> Result<Option<String>, ReportError> {
-    Ok(match &dance.origin {
-        Origin::Sequence(made) => Some(generated_page(subject, made)?),
-        Origin::Completion => None,
-        Origin::Song { song, dance } => {
-            Some(song_page(&subject.config.name, song, dance, data, sound)?)
-        }
-    })
+) -> Result<String, ReportError> {
+    let name = &subject.config.name;
+    match &dance.origin {
+        Origin::Sequence(made) => generated_page(subject, made),
+        Origin::Completion { keyframes, made } => Ok(completed_page(name, keyframes, made)?),
+        Origin::Song { song, dance } => song_page(name, song, dance, data, sound),
+    }
+}
+
+/// The page of a completed dance, HTML: its keyframes where they were given, which is where its
+/// root would go, and which foot stands.
+fn completed_page(
+    model: &str,
+    keyframes: &[(usize, Pose)],
+    made: &Completion,
+) -> Result<String, FigureError> {
+    let clip = &made.clip;
+    let stands = |foot: Option<&Foot>| {
+        let [left, right] = [Foot::Left, Foot::Right].map(|it| foot == Some(&it));
+        [left, left, right, right]
+    };
+    let feet = |frame: usize| made.contacts.as_ref().and_then(|feet| feet.get(frame));
+    let contacts = (0..clip.poses.len()).map(|frame| stands(feet(frame)));
+    let motion = ViewerMotion::from_clip(model, MotionKind::Model, clip, contacts.collect());
+    let keyframes = keyframes.iter().map(|(frame, pose)| ViewerKeyframe {
+        frame: *frame,
+        positions: pose.world_positions(&clip.skeleton),
+    });
+    Viewer {
+        title: clip.name.clone(),
+        frame_time: clip.frame_time,
+        body: ViewerBody::of(&clip.skeleton),
+        motions: vec![motion],
+        keyframes: keyframes.collect(),
+        asked: None,
+        music: None,
+    }
+    .html()
 }
 
 /// The page of what a subject made of a request with keyframes, HTML: beside the recorded motion,

@@ -4,6 +4,7 @@
 //! JSON. Nothing that a user wrote becomes markup: names are escaped in the page's title, and
 //! inside the JSON no `<` is left that could end its element.
 
+mod body;
 #[cfg(feature = "papers")]
 mod generated;
 mod page;
@@ -17,19 +18,18 @@ use serde::Serialize;
 
 use super::FigureError;
 use crate::counted::counted;
-use crate::motion::contact::{FOOT_JOINTS, in_contact};
+use crate::motion::Clip;
+use crate::motion::contact::in_contact;
 use crate::motion::placement::{vector, world_positions};
-use crate::motion::skeleton::{DANCE_PARENTS, JOINTS};
 use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
 
+pub use body::ViewerBody;
 #[cfg(feature = "papers")]
-pub use generated::{check_page, dance_page};
+pub use generated::dance_page;
 #[cfg(feature = "papers")]
 pub use song::{Sound, song_page};
 
-/// Index of the joint that carries the head.
-const HEAD: usize = 23;
 /// The body parts as the page calls them.
 const PART_LABELS: [&str; PARTS] = ["Trunk", "Left leg", "Right leg", "Right arm", "Left arm"];
 
@@ -40,6 +40,8 @@ pub struct Viewer {
     pub title: String,
     /// Seconds a frame.
     pub frame_time: f64,
+    /// Whose joints all positions are of.
+    pub body: ViewerBody,
     /// In the order of their keys 1, 2, 3 ...; the first decides where the floor is.
     pub motions: Vec<ViewerMotion>,
     pub keyframes: Vec<ViewerKeyframe>,
@@ -100,11 +102,12 @@ pub enum MotionKind {
 pub struct ViewerMotion {
     pub name: String,
     pub kind: MotionKind,
-    /// World positions of the joints, `[frames][24]`, cm, Y up.
-    pub positions: Vec<[DVec3; JOINTS]>,
-    /// Which of LeftFoot, LeftToeBase, RightFoot, RightToeBase stand, a row a frame.
+    /// World positions of the joints, `[frames][joints]`, cm, Y up.
+    pub positions: Vec<Vec<DVec3>>,
+    /// Which of left ankle and toe, right ankle and toe stand, a row a frame.
     pub contacts: Vec<[bool; 4]>,
-    /// Velocity factors as measured, a row a frame, cm/frame.
+    /// Velocity factors as measured, a row a frame, cm/frame; empty in all motions where the body
+    /// has no such parts.
     pub velocity_factors: Vec<[f64; PARTS]>,
 }
 
@@ -113,7 +116,7 @@ pub struct ViewerMotion {
 pub struct ViewerKeyframe {
     pub frame: usize,
     /// World positions of the joints, cm.
-    pub positions: [DVec3; JOINTS],
+    pub positions: Vec<DVec3>,
 }
 
 impl ViewerMotion {
@@ -127,9 +130,29 @@ impl ViewerMotion {
         Self {
             name: name.into(),
             kind,
-            positions: frames.rows().into_iter().map(world_positions).collect(),
+            positions: frames
+                .rows()
+                .into_iter()
+                .map(|frame| world_positions(frame).to_vec())
+                .collect(),
             contacts: frames.rows().into_iter().map(in_contact).collect(),
             velocity_factors: measured_velocity_factors(frames),
+        }
+    }
+
+    /// A motion on any skeleton, without velocity factors; `contacts` `[frames]`.
+    pub fn from_clip(
+        name: impl Into<String>,
+        kind: MotionKind,
+        clip: &Clip,
+        contacts: Vec<[bool; 4]>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            positions: clip.skeleton.world_positions(&clip.poses),
+            contacts,
+            velocity_factors: Vec::new(),
         }
     }
 }
@@ -138,8 +161,8 @@ impl Viewer {
     /// The page.
     ///
     /// # Errors
-    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length, a
-    /// keyframe outside, a NaN or infinity.
+    /// [`FigureError`]: no motions or frames, motions or what was asked for of different length,
+    /// poses of other joints than the body's, a keyframe outside, a NaN or infinity.
     pub fn html(&self) -> Result<String, FigureError> {
         self.check()?;
         let frames = self.frames();
@@ -150,10 +173,12 @@ impl Viewer {
             summary: self.summary(),
             frames,
             frame_time: self.frame_time,
-            parents: DANCE_PARENTS.map(|parent| parent.map_or(-1, |parent| parent as i32)),
-            head: HEAD,
-            feet: FOOT_JOINTS,
-            parts: PART_LABELS,
+            body: &self.body,
+            parts: if self.has_factors() {
+                &PART_LABELS
+            } else {
+                &[]
+            },
             motions: self.motions.iter().map(PageMotion::new).collect(),
             keyframes: self.keyframes.iter().map(PageKeyframe::new).collect(),
             trajectory: asked.root_trajectory.iter().map(place).collect(),
@@ -166,6 +191,11 @@ impl Viewer {
     fn frames(&self) -> usize {
         let first = self.motions.first();
         first.map_or(0, |motion| motion.positions.len())
+    }
+
+    fn has_factors(&self) -> bool {
+        let mut motions = self.motions.iter();
+        motions.any(|motion| !motion.velocity_factors.is_empty())
     }
 
     /// "101 frames, 3.3 s at 30 fps, 2 keyframes".
@@ -196,8 +226,12 @@ impl Viewer {
             return Err(self.not_finite("the frame time"));
         }
         let motions = self.motions.iter().flat_map(|motion| {
-            let (contacts, factors) = (motion.contacts.len(), motion.velocity_factors.len());
-            [motion.positions.len(), contacts, factors].map(|rows| (motion.name.as_str(), rows))
+            let factors = match self.has_factors() {
+                true => motion.velocity_factors.len(),
+                false => frames,
+            };
+            let rows = [motion.positions.len(), motion.contacts.len(), factors];
+            rows.map(|rows| (motion.name.as_str(), rows))
         });
         let asked = self.asked.iter();
         let places = asked.map(|asked| ("the root trajectory", asked.root_trajectory.len()));
@@ -213,6 +247,16 @@ impl Viewer {
                 self.title, keyframe.frame
             )));
         }
+        let bodies = self.motions.iter().flat_map(|motion| &motion.positions);
+        let mut bodies = bodies.chain(self.keyframes.iter().map(|key| &key.positions));
+        if let Some(body) = bodies.find(|body| body.len() != self.body.joints()) {
+            return Err(FigureError::Unfit(format!(
+                "{:?}: a pose of {} joints is none of a body of {}",
+                self.title,
+                body.len(),
+                self.body.joints()
+            )));
+        }
         self.check_numbers()
     }
 
@@ -220,8 +264,8 @@ impl Viewer {
         let factors = |rows: &[[f64; PARTS]]| rows.iter().flatten().all(|x| x.is_finite());
         let places = |places: &[DVec3]| places.iter().all(|place| place.is_finite());
         for motion in &self.motions {
-            let bodies = motion.positions.as_flattened();
-            if !(places(bodies) && factors(&motion.velocity_factors)) {
+            let mut bodies = motion.positions.iter();
+            if !(bodies.all(|body| places(body)) && factors(&motion.velocity_factors)) {
                 return Err(self.not_finite(&motion.name));
             }
         }
@@ -247,11 +291,9 @@ struct PageData<'v> {
     summary: String,
     frames: usize,
     frame_time: f64,
-    /// -1 for the root.
-    parents: [i32; JOINTS],
-    head: usize,
-    feet: [usize; 4],
-    parts: [&'static str; PARTS],
+    #[serde(flatten)]
+    body: &'v ViewerBody,
+    parts: &'static [&'static str],
     motions: Vec<PageMotion<'v>>,
     keyframes: Vec<PageKeyframe>,
     trajectory: Vec<[f64; 3]>,
@@ -279,7 +321,7 @@ impl PageKeyframe {
     fn new(keyframe: &ViewerKeyframe) -> Self {
         Self {
             frame: keyframe.frame,
-            positions: Steps::new(&[keyframe.positions]),
+            positions: Steps::new(std::slice::from_ref(&keyframe.positions)),
         }
     }
 }

@@ -134,6 +134,7 @@ function describe() {
   const names = motions.filter((motion) => motion.shown).map((motion) => motion.name);
   sceneCanvas.setAttribute("aria-label", `Dancers in 3D: ${names.join(", ") || "none shown"}`);
   const legend = element("legend");
+  element("factors").classList.toggle("bare", !data.parts.length);
   legend.replaceChildren("Velocity factors, cm/frame");
   const entry = (name, colour, asked) => {
     const item = document.createElement("span");

@@ -5,8 +5,6 @@ use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::motion::skeleton::JOINTS;
-
 /// Positions as steps from an origin; the page has `origin + step * steps`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Steps {
@@ -15,7 +13,7 @@ pub(super) struct Steps {
     /// cm: 1/64, or more where that does not reach to all of the motion (beyond 5 m from its
     /// middle).
     step: f64,
-    /// Little-endian i16 in base64, `[frames * 24 * 3]`.
+    /// Little-endian i16 in base64, `[frames * joints * 3]`.
     steps: String,
 }
 
@@ -23,7 +21,7 @@ pub(super) struct Steps {
 const FINEST: f64 = 1.0 / 64.0;
 
 impl Steps {
-    pub(super) fn new(frames: &[[DVec3; JOINTS]]) -> Self {
+    pub(super) fn new(frames: &[Vec<DVec3>]) -> Self {
         let places = || frames.iter().flatten();
         let low = places().fold(DVec3::INFINITY, |low, &place| low.min(place));
         let high = places().fold(DVec3::NEG_INFINITY, |high, &place| high.max(place));

@@ -17,12 +17,7 @@ function readColours() {
 const lineColour = (hue) => (colours.dark ? colours[hue] : colours[`${hue}-edge`]);
 
 /** Thickness of the bone that ends at a joint, cm. */
-const thickness = data.parents.map((_, joint) => {
-  if (joint >= 9 && joint <= 13) return 9;
-  if ([1, 2, 5, 6].includes(joint)) return 7.6;
-  if ([4, 8, 17, 21].includes(joint)) return 5;
-  return 6.4;
-});
+const thickness = data.thickness;
 const HEAD_RADIUS = 9.5;
 
 /** Cells of the canvas for dancers side by side, as large as they can be. */
@@ -152,6 +147,7 @@ function addBones(view, pose, hue, ghost, parts) {
     if (Math.min(a[2], b[2]) < 10) return;
     parts.push({ a, b, depth, width: Math.max(thickness[joint] * view.scale(depth), 1.5), hue, ghost });
   });
+  if (data.head === null) return;
   const [neck, head] = [data.parents[data.head], data.head].map((joint) => [0, 1, 2].map((axis) => pose[3 * joint + axis]));
   const length = Math.hypot(...head.map((value, axis) => value - neck[axis])) || 1;
   const centre = head.map((value, axis) => value + ((value - neck[axis]) / length) * 6);

@@ -4,14 +4,13 @@ use std::path::Path;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use glam::DVec3;
 use url::Url;
 
-use super::{MotionKind, Viewer, ViewerKeyframe, ViewerMotion, ViewerMusic};
+use super::{MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion, ViewerMusic};
 use crate::data::DataConfig;
 use crate::models::ModelError;
 use crate::models::transition::DanceClip;
-use crate::motion::{Clip, JOINTS};
+use crate::motion::Clip;
 use crate::report::ReportError;
 use crate::run::FileError;
 use crate::synthesis::song::Song;
@@ -94,15 +93,14 @@ pub fn song_page(
         let frame = given.frame as usize;
         let world = given.pose.world_positions(&dance.skeleton);
         let there = dance.poses[frame].translations[0] - world[0];
-        let mut positions = [DVec3::ZERO; JOINTS];
-        let placed = positions.iter_mut().zip(&world);
-        placed.for_each(|(into, joint)| *into = *joint + there);
+        let positions = world.iter().map(|joint| *joint + there).collect();
         ViewerKeyframe { frame, positions }
     });
     let features = measured.features.view();
     let viewer = Viewer {
         title: format!("{} to {}", dance.name, music.name),
         frame_time: dance.frame_time,
+        body: ViewerBody::dance(),
         motions: vec![ViewerMotion::from_features(
             model,
             MotionKind::Model,

@@ -93,6 +93,9 @@ pub(super) fn complete(
     Ok(Dance {
         document: document.map_err(DanceError::Document)?,
         summary: DanceSummary::Completion(summary),
-        origin: Origin::Completion,
+        origin: Origin::Completion {
+            keyframes: request.keyframes,
+            made: Box::new(completion),
+        },
     })
 }

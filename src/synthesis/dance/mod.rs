@@ -10,12 +10,12 @@ use thiserror::Error;
 use super::controls::ControlError;
 use super::keyframes::{KeyframeError, Keyframes};
 use super::song::{Song, SongError};
-use super::{Sequence, SequenceRequest, SynthesisError, SynthesisOptions};
+use super::{Completion, Sequence, SequenceRequest, SynthesisError, SynthesisOptions};
 use crate::counted::counted;
 use crate::data::DataConfig;
 use crate::models::generator::NeededPoses;
-use crate::motion::Clip;
 use crate::motion::bvh::{Bvh, BvhError};
+use crate::motion::{Clip, Pose};
 use crate::run::{RunError, Subject};
 
 pub use request::DanceRequest;
@@ -60,8 +60,11 @@ pub struct MadeSequence {
 /// What a dance was made from, as far as a page shows it.
 pub enum Origin {
     Sequence(Box<MadeSequence>),
-    /// Keyframes, by a model that makes rotations.
-    Completion,
+    /// Keyframes, and what a model that makes rotations made of them.
+    Completion {
+        keyframes: Vec<(usize, Pose)>,
+        made: Box<Completion>,
+    },
     Song {
         song: Box<Song>,
         dance: Clip,

@@ -15,7 +15,7 @@ use crate::motion::features::FRAME;
 use crate::motion::placement::world_positions;
 use crate::report::{
     Asked, FigureError, MotionFigure, MotionKind, MotionRow, Placing, ReportError, Shown, Viewer,
-    ViewerKeyframe, ViewerMotion,
+    ViewerBody, ViewerKeyframe, ViewerMotion,
 };
 use crate::run::replace_file;
 use crate::synthesis::{SynthesisedMotion, transition_motion};
@@ -126,13 +126,14 @@ impl<'d> Showcase<'d> {
             .map(|(name, kind, frames)| ViewerMotion::from_features(*name, *kind, frames.view()));
         let keyframes = [0, LENGTH].map(|frame| ViewerKeyframe {
             frame,
-            positions: world_positions(self.recorded.row(frame)),
+            positions: world_positions(self.recorded.row(frame)).to_vec(),
         });
         let (root, factors) = (&self.request.root, &self.request.velocity_factors);
         let asked = root.as_ref().zip(factors.as_ref());
         Viewer {
             title: self.to_string(),
             frame_time: self.clip.clip.frame_time,
+            body: ViewerBody::dance(),
             motions: motions.collect(),
             keyframes: keyframes.to_vec(),
             asked: asked.map(|(root, factors)| Asked::new(root.view(), factors.view())),
