@@ -42,6 +42,7 @@ pub struct FigureRequest<'a> {
     pub page: bool,
 }
 
+#[cfg(feature = "papers")]
 impl FigureRequest<'_> {
     /// Refuses rows where no figure of the paper is over rows.
     ///
