@@ -118,6 +118,20 @@ impl MultiHeadAttention {
         x: Var,
         tokens: usize,
     ) -> Result<Var, AutogradError> {
+        self.own_biased(tape, x, tokens, None)
+    }
+
+    /// [`MultiHeadAttention::own`] with `bias [1 or heads, tokens, tokens]` added to the scores.
+    ///
+    /// # Errors
+    /// Rows that are no whole windows, a bias of another shape.
+    pub fn own_biased<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        x: Var,
+        tokens: usize,
+        bias: Option<Var>,
+    ) -> Result<Var, AutogradError> {
         let projected = self.in_projection.forward(tape, x)?;
         let columns = |k: usize| HeadColumns {
             value: projected,
@@ -125,7 +139,32 @@ impl MultiHeadAttention {
         };
         let shape = self.shape(tokens, tokens);
         let operands = [0, 1, 2].map(columns);
-        let y = tape.attention(operands, shape, None, self.sizes.dropout)?;
+        let y = tape.attention(operands, shape, bias, self.sizes.dropout)?;
+        self.output.forward(tape, y)
+    }
+
+    /// Attention of some tokens of each window, `asking [windows * queries, d]`, to all of them,
+    /// `x [windows * tokens, d]`, with `bias [1 or heads, queries, tokens]` added to the scores, as
+    /// `[windows * queries, d]`.
+    ///
+    /// # Errors
+    /// Rows that are no whole windows, a bias of another shape.
+    pub fn some_biased<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        (asking, queries): (Var, usize),
+        (x, tokens): (Var, usize),
+        bias: Option<Var>,
+    ) -> Result<Var, AutogradError> {
+        let value = self.queries.forward(tape, asking)?;
+        let memory = self.project_memory(tape, x)?;
+        let columns = |k: usize| HeadColumns {
+            value: memory,
+            start: k * self.sizes.width,
+        };
+        let operands = [HeadColumns { value, start: 0 }, columns(0), columns(1)];
+        let shape = self.shape(queries, tokens);
+        let y = tape.attention(operands, shape, bias, self.sizes.dropout)?;
         self.output.forward(tape, y)
     }
 

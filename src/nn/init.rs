@@ -7,9 +7,9 @@ use rand::{Rng, RngExt};
 
 use crate::autograd::{AutogradError, BlockId, BufferId, ParameterId, Parameters, Real};
 
-/// Most weights that a model may have, 1 GiB in f32: sizes beyond are a mistake in a config, and
+/// Most weights that a model may have, 2 GiB in f32: sizes beyond are a mistake in a config, and
 /// memory would end first.
-pub const MOST_WEIGHTS: usize = 1 << 28;
+pub const MOST_WEIGHTS: usize = 1 << 29;
 
 /// Adds named parameters with initial values drawn from one stream.
 ///
@@ -83,6 +83,46 @@ impl<'a, T: Real, R: Rng> Initialiser<'a, T, R> {
     ) -> (ParameterId, BlockId) {
         let value = ArrayD::from_elem(self.admit(shape), T::from_f64(value));
         self.parameters.add(name, value)
+    }
+
+    /// Values that `make` computes, where the limit allows them.
+    pub fn made(
+        &mut self,
+        name: String,
+        shape: &[usize],
+        make: impl FnOnce(&mut R) -> ArrayD<T>,
+    ) -> (ParameterId, BlockId) {
+        let value = self.value(shape, make);
+        self.parameters.add(name, value)
+    }
+
+    /// [`Initialiser::made`] for a [buffer](Initialiser::buffer).
+    pub fn made_buffer(
+        &mut self,
+        name: String,
+        shape: &[usize],
+        make: impl FnOnce(&mut R) -> ArrayD<T>,
+    ) -> BufferId {
+        let value = self.value(shape, make);
+        self.parameters.add_buffer(name, value)
+    }
+
+    fn value(&mut self, shape: &[usize], make: impl FnOnce(&mut R) -> ArrayD<T>) -> ArrayD<T> {
+        let admitted = self.admit(shape);
+        match self.exceeded() {
+            None => make(&mut self.rng),
+            Some(_) => ArrayD::from_elem(admitted, T::zero()),
+        }
+    }
+
+    /// The parameters so far, such as to start some of them from data.
+    pub fn parameters_mut(&mut self) -> &mut Parameters<T> {
+        self.parameters
+    }
+
+    /// Weights that were asked for, of buffers, too, whether the limit allowed them or not.
+    pub fn asked_for(&self) -> usize {
+        self.added
     }
 
     /// A buffer, such as a running mean: saved with the weights, moved by no gradient.

@@ -25,9 +25,22 @@ impl Lstm {
         inputs: usize,
         hidden: usize,
     ) -> Self {
+        Self::layer(init, name, 0, inputs, hidden)
+    }
+
+    /// [`Lstm::new`] as layer `layer` of several, `.weight_ih_l{layer}` and so on.
+    pub fn layer<T: Real, R: Rng>(
+        init: &mut Initialiser<'_, T, R>,
+        name: &str,
+        layer: usize,
+        inputs: usize,
+        hidden: usize,
+    ) -> Self {
         let bound = 1.0 / (hidden as f64).sqrt();
-        let mut weight =
-            |kind: &str, shape: &[usize]| init.uniform(format!("{name}.{kind}_l0"), shape, bound).1;
+        let mut weight = |kind: &str, shape: &[usize]| {
+            let name = format!("{name}.{kind}_l{layer}");
+            init.uniform(name, shape, bound).1
+        };
         Self {
             weight_ih: weight("weight_ih", &[4 * hidden, inputs]),
             weight_hh: weight("weight_hh", &[4 * hidden, hidden]),
@@ -62,5 +75,44 @@ impl Lstm {
         let state = tape.lstm_cell(x, state, weights)?;
         let output = tape.columns(state, 0..self.hidden)?;
         Ok((output, state))
+    }
+
+    /// All steps of sequences, `x [frames * batch, in]` frame by frame, from a state
+    /// `[batch, 2H]`: outputs `[frames * batch, H]` and the last state. What the inputs add to the
+    /// gates is one product for all frames.
+    ///
+    /// # Errors
+    /// Rows that are no whole frames; an input of another width.
+    pub fn sequence<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        x: Var,
+        state: Var,
+    ) -> Result<(Var, Var), AutogradError> {
+        let batch = tape.shape(state).first().copied().unwrap_or(0);
+        let rows = tape.shape(x).first().copied().unwrap_or(0);
+        if batch == 0 || !rows.is_multiple_of(batch) {
+            return Err(AutogradError::Argument {
+                operation: "lstm",
+                shape: tape.shape(x).to_vec(),
+                argument: format!("{batch} sequences"),
+                expected: "a row a frame and sequence",
+            });
+        }
+        let (weight, bias) = (tape.block(self.weight_ih), tape.block(self.bias_ih));
+        let of_inputs = tape.linear(x, weight, Some(bias), false)?;
+        let (weight, bias) = (tape.block(self.weight_hh), tape.block(self.bias_hh));
+        let mut state = state;
+        let mut outputs = Vec::new();
+        for frame in 0..rows / batch {
+            let h = tape.columns(state, 0..self.hidden)?;
+            let of_state = tape.linear(h, weight, Some(bias), false)?;
+            let of_input = tape.rows(of_inputs, frame * batch..(frame + 1) * batch)?;
+            let gates = tape.add(of_input, of_state)?;
+            state = tape.lstm_gates(gates, state)?;
+            outputs.push(tape.columns(state, 0..self.hidden)?);
+        }
+        let stacked = tape.stack(&outputs)?;
+        Ok((tape.reshape(stacked, &[rows, self.hidden])?, state))
     }
 }

@@ -8,6 +8,7 @@ mod lstm;
 pub mod measure;
 mod mlp;
 mod norm;
+mod positioned_transformer;
 mod positions;
 mod pre_norm;
 mod transformer;
@@ -19,6 +20,9 @@ pub use linear::Linear;
 pub use lstm::Lstm;
 pub use mlp::{Activation, LastLayer, Mlp};
 pub use norm::LayerNorm;
+pub use positioned_transformer::{
+    Place, PositionedSizes, PositionedTransformer, Positions, t5_bucket,
+};
 pub use positions::sinusoidal_positions;
 pub use pre_norm::PreNormEncoderLayer;
 pub use transformer::{TransformerDecoderLayer, TransformerEncoderLayer, TransformerSizes};

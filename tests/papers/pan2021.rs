@@ -733,7 +733,7 @@ fn sizes_that_no_model_has_are_refused_by_their_key() {
         ),
         (
             |config| (config.hidden, config.code) = (65_536, 4096),
-            "more than 268435456 weights",
+            "more than 536870912 weights",
         ),
     ];
     for (change, words) in cases {

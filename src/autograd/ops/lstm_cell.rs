@@ -8,8 +8,9 @@
 //! ```
 
 use super::linear::{bias_gradient, input_gradient};
+use super::lstm_core::{Advanced, activate, advance, gates_gradient};
 use super::shapes_error;
-use crate::autograd::kernels::{Mat, MatMut, vectorised};
+use crate::autograd::kernels::{Mat, MatMut};
 use crate::autograd::{AutogradError, Backward, Operation, Real, Tape, Var, Workspace};
 
 /// Weights of an LSTM cell on a tape, named and laid out as in PyTorch.
@@ -40,41 +41,14 @@ impl<T: Real> Operation<T> for LstmCell<T> {
     fn backward(&self, dy: &mut [T], context: &mut Backward<'_, T>) {
         let (batch, n) = (self.batch, self.hidden);
         let before = context.values(self.state);
-        let after = context.output();
         let mut dgates = context.take(batch * 4 * n);
         let mut tanh_c = context.take(batch * n);
-        for b in 0..batch {
-            let c = &after[b * 2 * n + n..(b + 1) * 2 * n];
-            tanh_c[b * n..(b + 1) * n].copy_from_slice(c);
-        }
-        T::tanh_slice(&mut tanh_c);
-        let one = T::one();
-        vectorised(
-            #[inline(always)]
-            || {
-                for b in 0..batch {
-                    let (dh, dc) = dy[b * 2 * n..(b + 1) * 2 * n].split_at_mut(n);
-                    let gates = &self.gates[b * 4 * n..(b + 1) * 4 * n];
-                    let (i, rest) = gates.split_at(n);
-                    let (f, rest) = rest.split_at(n);
-                    let (g, o) = rest.split_at(n);
-                    let dgates = &mut dgates[b * 4 * n..(b + 1) * 4 * n];
-                    let (di, rest) = dgates.split_at_mut(n);
-                    let (df, rest) = rest.split_at_mut(n);
-                    let (dg, d_o) = rest.split_at_mut(n);
-                    let c = &before[b * 2 * n + n..(b + 1) * 2 * n];
-                    let tanh_c = &tanh_c[b * n..(b + 1) * n];
-                    for j in 0..n {
-                        let dc_new = dc[j] + dh[j] * o[j] * (one - tanh_c[j] * tanh_c[j]);
-                        di[j] = dc_new * g[j] * i[j] * (one - i[j]);
-                        df[j] = dc_new * c[j] * f[j] * (one - f[j]);
-                        dg[j] = dc_new * i[j] * (one - g[j] * g[j]);
-                        d_o[j] = dh[j] * tanh_c[j] * o[j] * (one - o[j]);
-                        dc[j] = dc_new * f[j];
-                    }
-                }
-            },
-        );
+        let advanced = Advanced {
+            gates: &self.gates,
+            before,
+            after: context.output(),
+        };
+        gates_gradient(advanced, dy, &mut dgates, &mut tanh_c, n);
         let w = self.weights;
         bias_gradient(context, w.bias_ih, &dgates);
         bias_gradient(context, w.bias_hh, &dgates);
@@ -165,25 +139,10 @@ impl<T: Real> Tape<'_, T> {
             for ((gate, &a), &b) in row.iter_mut().zip(b_ih).zip(b_hh) {
                 *gate += a + b;
             }
-            T::sigmoid_slice(&mut row[..2 * n]);
-            T::tanh_slice(&mut row[2 * n..3 * n]);
-            T::sigmoid_slice(&mut row[3 * n..]);
         }
+        activate(&mut gates, n);
         let mut y = self.take(batch * 2 * n);
-        let before = self.values(state);
-        for b in 0..batch {
-            let gates = &gates[b * 4 * n..(b + 1) * 4 * n];
-            let c = &before[b * 2 * n + n..(b + 1) * 2 * n];
-            let (h_new, c_new) = y[b * 2 * n..(b + 1) * 2 * n].split_at_mut(n);
-            for j in 0..n {
-                c_new[j] = gates[n + j] * c[j] + gates[j] * gates[2 * n + j];
-            }
-            h_new.copy_from_slice(c_new);
-            T::tanh_slice(h_new);
-            for j in 0..n {
-                h_new[j] *= gates[3 * n + j];
-            }
-        }
+        advance(&gates, self.values(state), &mut y, n);
         if !self.is_recording() {
             self.give(std::mem::take(&mut gates));
         }

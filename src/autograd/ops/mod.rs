@@ -29,14 +29,18 @@ mod linear;
 mod ln;
 mod log_softmax;
 pub mod lstm_cell;
+mod lstm_core;
+mod lstm_gates;
 mod matmul;
 mod mean;
 mod mul;
 mod noise;
 mod normalise;
 mod plu;
+pub mod plu_product;
 mod prelu;
 pub mod query_attention;
+mod relative_bias;
 mod reshape;
 mod rows;
 mod shared_attention;
@@ -86,7 +90,7 @@ mod gradient_is_that_of_central_differences {
     use crate::autograd::check::property::check;
 
     /// Files of this folder that are no operations.
-    const OTHERS: [&str; 4] = ["mod", "attention_core", "broadcast", "unary"];
+    const OTHERS: [&str; 5] = ["mod", "attention_core", "broadcast", "lstm_core", "unary"];
 
     /// A test of each operation on the cases that its file draws: without them it does not compile.
     macro_rules! operations {
@@ -124,14 +128,17 @@ mod gradient_is_that_of_central_differences {
         ln,
         log_softmax,
         lstm_cell,
+        lstm_gates,
         matmul,
         mean,
         mul,
         noise,
         normalise,
         plu,
+        plu_product,
         prelu,
         query_attention,
+        relative_bias,
         reshape,
         rows,
         shared_attention,
