@@ -6,19 +6,24 @@
 //! - [`settings`]: what the commands ask of a kind of model;
 //! - [`registry`]: the list of kinds;
 //! - [`transition`]: what the models of transitions between two keyframes share;
-//! - [`rotations`]: what the models of rotations on any skeleton share.
+//! - [`rotations`]: what the models of rotations on any skeleton share;
+//! - [`flow`]: what normalising flows share.
 
 #[cfg(feature = "papers")]
 pub mod baselines;
 #[cfg(feature = "papers")]
 pub mod duan2022;
 pub mod exported_batch;
+#[cfg(feature = "papers")]
+pub mod flow;
 pub mod generator;
 pub mod gradient_report;
 #[cfg(feature = "papers")]
 pub mod harvey2020;
 #[cfg(feature = "papers")]
 pub mod li2023;
+#[cfg(feature = "papers")]
+pub mod moglow2020;
 #[cfg(feature = "papers")]
 pub mod pan2021;
 #[cfg(feature = "papers")]
@@ -32,6 +37,8 @@ pub mod streams;
 pub mod task;
 #[cfg(feature = "papers")]
 pub mod transition;
+#[cfg(feature = "papers")]
+pub mod valleperez2021;
 pub mod watched;
 pub mod weights;
 

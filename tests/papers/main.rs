@@ -43,6 +43,7 @@ mod step_batches;
 mod synthesis;
 mod tables;
 mod training;
+mod valleperez2021;
 mod velocity_refinement;
 mod windows;
 mod wording;
