@@ -117,6 +117,10 @@ pub struct ValidationConfig {
     /// Lengths, frames; left out: those of the model's protocol.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Vec<usize>>,
+    /// Whether the training ends with the weights of its best score, by the first metric of its
+    /// protocol, in the place of its last.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub keep_best: bool,
 }
 
 impl Default for ValidationConfig {
@@ -125,6 +129,7 @@ impl Default for ValidationConfig {
             every_steps: 500,
             windows: 32,
             lengths: None,
+            keep_best: false,
         }
     }
 }

@@ -13,6 +13,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::best::is_best;
 use super::checkpoint::{self, WEIGHTS_FILE};
 use super::durable::{self, FileError};
 use super::error::RunError;
@@ -61,6 +62,7 @@ impl RunFolder {
         let run = Self::locked(path)?;
         if run.config_path().exists() && run.config()?.name == config.name {
             durable::remove_folder(&run.checkpoints())?;
+            run.remove_best()?;
             for name in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG] {
                 durable::remove(&path.join(name))?;
             }
@@ -108,7 +110,9 @@ impl RunFolder {
         let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
         let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE, LOCK];
         let is_own =
-            own.contains(&&*name) || name.starts_with("evaluation") && name.ends_with(".json");
+            own.contains(&&*name)
+                || is_best(&name)
+                || name.starts_with("evaluation") && name.ends_with(".json");
         is_own && folder.join(Self::CONFIG).is_file()
     }
 

@@ -89,6 +89,9 @@ pub struct Manifest {
     pub parameters: usize,
     /// SHA-256 of the weights (see [`crate::models::weights::digest`]), once finished.
     pub weights_digest: Option<String>,
+    /// The step of the best validation score, where the weights at the end are its.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub best_step: Option<u64>,
     /// What the task says of its schedule and the training data, see [`Task::facts`].
     #[serde(flatten)]
     pub facts: Map<String, Value>,
@@ -152,6 +155,7 @@ impl Manifest {
             data_digest: dataset.digest.clone(),
             parameters,
             weights_digest: None,
+            best_step: None,
             facts: task.facts(),
         }
     }

@@ -1,5 +1,6 @@
 //! A run's folder: config, manifest, log, checkpoints, weights, each there whole or not at all.
 
+mod best;
 pub mod checkpoint;
 mod durable;
 mod error;

@@ -5,6 +5,7 @@
 //! moves the weights by the sum of their gradients. Everything that goes on is kept in a
 //! [`RunFolder`](crate::run::RunFolder), from which a training goes on to the bit.
 
+mod best;
 mod error;
 pub mod measure;
 mod record;

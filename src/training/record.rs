@@ -20,6 +20,8 @@ pub(super) struct Record<'r> {
     start: Instant,
     /// Steps of the newest checkpoint.
     saved: Option<u64>,
+    /// The step that the weights at the end are of, where it is not the last.
+    pub best_step: Option<u64>,
 }
 
 impl<'r> Record<'r> {
@@ -49,6 +51,7 @@ impl<'r> Record<'r> {
             seconds_before,
             start: Instant::now(),
             saved: newest.map(|(step, _)| step),
+            best_step: None,
         };
         record.describe(trainer, RunState::Running)?;
         Ok(record)
@@ -98,6 +101,7 @@ impl<'r> Record<'r> {
         self.manifest.finished = Some(manifest::now());
         if state == RunState::Finished {
             self.manifest.weights_digest = Some(trainer.weights_digest());
+            self.manifest.best_step = self.best_step;
         }
         self.describe(trainer, state)
     }

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use super::error::TrainingError;
 use super::trainer::Trainer;
 use crate::data::file_digest;
 use crate::run::checkpoint::{self, Checkpoint};
@@ -35,9 +36,11 @@ impl Trainer<'_> {
     /// # Errors
     /// The run is of another config, other data or another model, or there are checkpoints but none
     /// is whole.
-    pub fn resume(&mut self, run: &RunFolder) -> Result<Resumed, RunError> {
-        self.resume_newest(run)
-            .map_err(|error| run.or_other_version(error))
+    pub fn resume(&mut self, run: &RunFolder) -> Result<Resumed, TrainingError> {
+        let resumed = self.resume_newest(run);
+        let resumed = resumed.map_err(|error| run.or_other_version(error))?;
+        self.resume_best(run)?;
+        Ok(resumed)
     }
 
     /// What is to be known where the steps so far were computed with another instruction set.

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use super::best::Best;
 use super::error::TrainingError;
 use super::record::Record;
 use super::report::StepReport;
@@ -29,9 +30,10 @@ pub struct Trainer<'d> {
     pub(super) adam: Adam<f32>,
     pub(super) threads: usize,
     pub(super) frame_steps: u64,
-    validation: Option<Validation<'d>>,
+    pub(super) validation: Option<Validation<'d>>,
+    pub(super) best: Option<Best>,
     streams: Streams,
-    stepper: Stepper,
+    pub(super) stepper: Stepper,
 }
 
 /// How a training ended.
@@ -98,6 +100,7 @@ impl<'d> Trainer<'d> {
             threads,
             frame_steps: 0,
             validation: Validation::new(&config, dataset)?,
+            best: None,
             config,
         })
     }
@@ -185,6 +188,11 @@ impl<'d> Trainer<'d> {
                     return Err(error);
                 }
             };
+            let validation = self.validation.as_ref().zip(report.validation.as_ref());
+            let score = validation.and_then(|(by, scores)| by.deciding_score(scores));
+            if let Some(score) = score {
+                self.take_best(report.step, score, out)?;
+            }
             if let Some(record) = &mut record {
                 record.step(self, &report)?;
             }
@@ -198,9 +206,13 @@ impl<'d> Trainer<'d> {
         }
         if let Some(record) = &mut record {
             record.save(self)?;
+            record.best_step = self.end_with_best();
             let weights = self.weights_file()?;
             record.run.write_weights(&weights)?;
             record.end(self, RunState::Finished)?;
+            record.run.remove_best().map_err(RunError::from)?;
+        } else {
+            self.end_with_best();
         }
         Ok(Outcome::Finished)
     }

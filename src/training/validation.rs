@@ -3,7 +3,7 @@
 use super::error::TrainingError;
 use crate::counted::counted;
 use crate::data::{DataPart, Dataset, Recording};
-use crate::evaluation::{EvaluationError, EvaluationOptions, Protocol, Scores};
+use crate::evaluation::{Better, EvaluationError, EvaluationOptions, Protocol, Scores};
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 
@@ -71,5 +71,20 @@ impl<'d> Validation<'d> {
             .protocol
             .evaluate(model, self.dataset, DataPart::Validation)?;
         Ok(scored.scores)
+    }
+
+    /// What weights are chosen by: the protocol's first metric in its first column.
+    pub fn deciding_score(&self, scores: &Scores) -> Option<f64> {
+        let metric = self.protocol.metrics().first()?;
+        let row = scores.row(metric.key)?;
+        row.at(row.columns().next()?)
+    }
+
+    /// Whether one such score is better than another.
+    pub fn is_better(&self, score: f64, other: f64) -> bool {
+        match self.protocol.metrics().first().map(|metric| metric.better) {
+            Some(Better::Higher) => score > other,
+            _ => score < other,
+        }
     }
 }
