@@ -19,6 +19,7 @@ mod regenerate;
 mod reproduce;
 mod runs;
 mod stop;
+mod study;
 mod tables;
 mod threads;
 mod train;
@@ -71,6 +72,9 @@ enum Command {
     Tables(tables::TablesArgs),
     #[command(after_help = include_str!("help/figures.txt"))]
     Figures(figures::FiguresArgs),
+    /// Have people rate dances without knowing whose they are, and analyse the ratings
+    #[command(after_help = include_str!("help/study.txt"))]
+    Study(study::StudyArgs),
     #[command(after_help = include_str!("help/regenerate.txt"))]
     Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/runs.txt"))]
@@ -117,6 +121,7 @@ impl Cli {
             Command::Regenerate(args) => regenerate::run(args)?,
             Command::Reproduce(args) => return reproduce::run(args),
             Command::Figures(args) => figures::run(args)?,
+            Command::Study(args) => study::run(args)?,
             Command::Tables(args) => tables::run(args)?,
             Command::Runs(args) => runs::run(args)?,
             Command::Demo(args) => return demo::run(args),

@@ -19,6 +19,8 @@ pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};
 #[cfg(feature = "music")]
 pub use pairs::music_beside;
+#[cfg(feature = "papers")]
+pub(crate) use pairs::{sound_files, sound_of};
 pub use part::{DataPart, EmptyPart};
 pub use reading::FileReading;
 pub use windows::{Window, WindowCut};

@@ -17,7 +17,7 @@ const ENDINGS: [&str; 4] = ["wav", "flac", "mp3", "ogg"];
 ///
 /// # Errors
 /// The folder cannot be read; two files of one name.
-pub(super) fn sound_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
+pub(crate) fn sound_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, DataError> {
     let own = folder.join(SOUNDS);
     let folder = if own.is_dir() { &own } else { folder };
     let mut files: BTreeMap<String, PathBuf> = BTreeMap::new();
@@ -54,7 +54,7 @@ pub fn music_beside(dance: &Path) -> Option<PathBuf> {
 }
 
 /// What is heard in the sound file of a dance; `None` where there is none of its name.
-pub(super) fn sound_of<'f>(
+pub(crate) fn sound_of<'f>(
     dance: &str,
     sounds: &'f BTreeMap<String, PathBuf>,
 ) -> Option<&'f PathBuf> {

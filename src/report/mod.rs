@@ -16,6 +16,8 @@ pub mod root_panel;
 mod run_table;
 mod schedule_note;
 mod score_figure;
+#[cfg(feature = "papers")]
+pub mod study;
 pub mod svg;
 mod thousands;
 pub mod training_curves;

@@ -38,4 +38,5 @@ mod rotations;
 mod song;
 mod song_figures;
 mod stopped;
+mod study;
 mod viewer;

@@ -28,6 +28,8 @@ pub use body::ViewerBody;
 #[cfg(feature = "papers")]
 pub use generated::dance_page;
 #[cfg(feature = "papers")]
+pub(in crate::report) use page::{SCENE_SCRIPTS, STYLE, embedded_json, filled};
+#[cfg(feature = "papers")]
 pub use song::{Sound, song_page};
 
 /// The body parts as the page calls them.
@@ -164,16 +166,24 @@ impl Viewer {
     /// [`FigureError`]: no motions or frames, motions or what was asked for of different length,
     /// poses of other joints than the body's, a keyframe outside, a NaN or infinity.
     pub fn html(&self) -> Result<String, FigureError> {
+        Ok(page::page(&self.title, &self.data()?))
+    }
+
+    /// What a page's scripts read.
+    ///
+    /// # Errors
+    /// As [`Viewer::html`].
+    pub(in crate::report) fn data(&self) -> Result<PageData, FigureError> {
         self.check()?;
         let frames = self.frames();
         let nothing = Asked::default();
         let asked = self.asked.as_ref().unwrap_or(&nothing);
         let place = |place: &DVec3| place.to_array().map(|x| rounded(x, 1));
-        let data = PageData {
+        Ok(PageData {
             summary: self.summary(),
             frames,
             frame_time: self.frame_time,
-            body: &self.body,
+            body: self.body.clone(),
             parts: if self.has_factors() {
                 &PART_LABELS
             } else {
@@ -183,9 +193,8 @@ impl Viewer {
             keyframes: self.keyframes.iter().map(PageKeyframe::new).collect(),
             trajectory: asked.root_trajectory.iter().map(place).collect(),
             asked: rounded_rows(&asked.velocity_factors),
-            music: self.music.as_ref(),
-        };
-        Ok(page::page(&self.title, &data))
+            music: self.music.clone(),
+        })
     }
 
     fn frames(&self) -> usize {
@@ -287,23 +296,23 @@ impl Viewer {
 /// What the page's scripts read (`data.js`).
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
-struct PageData<'v> {
+pub(in crate::report) struct PageData {
     summary: String,
     frames: usize,
     frame_time: f64,
     #[serde(flatten)]
-    body: &'v ViewerBody,
+    body: ViewerBody,
     parts: &'static [&'static str],
-    motions: Vec<PageMotion<'v>>,
+    motions: Vec<PageMotion>,
     keyframes: Vec<PageKeyframe>,
     trajectory: Vec<[f64; 3]>,
     asked: Vec<[f64; PARTS]>,
-    music: Option<&'v ViewerMusic>,
+    music: Option<ViewerMusic>,
 }
 
 #[derive(Serialize)]
-struct PageMotion<'v> {
-    name: &'v str,
+struct PageMotion {
+    name: String,
     kind: MotionKind,
     positions: Steps,
     /// Bit k of a frame's number is foot joint k.
@@ -326,14 +335,14 @@ impl PageKeyframe {
     }
 }
 
-impl<'v> PageMotion<'v> {
-    fn new(motion: &'v ViewerMotion) -> Self {
+impl PageMotion {
+    fn new(motion: &ViewerMotion) -> Self {
         let bits = |feet: &[bool; 4]| {
             let bits = feet.iter().enumerate();
             bits.map(|(foot, &stands)| u8::from(stands) << foot).sum()
         };
         Self {
-            name: &motion.name,
+            name: motion.name.clone(),
             kind: motion.kind,
             positions: Steps::new(&motion.positions),
             contacts: motion.contacts.iter().map(bits).collect(),

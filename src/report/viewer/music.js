@@ -1,6 +1,7 @@
 // The song under the dance. While it plays, it keeps the time; where it cannot be heard, the clock does.
 
 const song = data.music ? new Audio(data.music.source) : null;
+const SONG_START = (data.music && data.music.start) || 0; // s of the song before frame 0
 let audible = Boolean(song);
 
 if (song) {
@@ -13,7 +14,7 @@ if (song) {
 }
 
 /** The frame that is heard, or nothing where no song plays. */
-const heardFrame = () => (audible && !song.paused && !song.ended ? song.currentTime / data.frameTime : null);
+const heardFrame = () => (audible && !song.paused && !song.ended ? (song.currentTime - SONG_START) / data.frameTime : null);
 
 /** Plays from a frame on, or stops. */
 function playSong(playing, frame, speed) {
@@ -23,7 +24,7 @@ function playSong(playing, frame, speed) {
     song.pause();
     return;
   }
-  song.currentTime = frame * data.frameTime;
+  song.currentTime = SONG_START + frame * data.frameTime;
   // A browser that wants a click first keeps silent until then; the clock goes on.
   song.play().catch(() => {});
 }

@@ -24,6 +24,19 @@ pub enum Sound<'p> {
     Beside(&'p Path),
 }
 
+impl Sound<'_> {
+    /// What the page has of a file.
+    ///
+    /// # Errors
+    /// It cannot be read, or has no address that the page could name.
+    pub(in crate::report) fn source(self, file: &Path) -> Result<String, ReportError> {
+        Ok(match self {
+            Sound::Embedded => embedded(file)?,
+            Sound::Beside(page) => address(file, page)?,
+        })
+    }
+}
+
 impl ViewerMusic {
     /// The song of a dance of so many frames.
     ///
@@ -37,10 +50,7 @@ impl ViewerMusic {
         };
         Ok(Self {
             name: name.to_string_lossy().into(),
-            source: match sound {
-                Sound::Embedded => embedded(&song.file)?,
-                Sound::Beside(page) => address(&song.file, page)?,
-            },
+            source: sound.source(&song.file)?,
             beats: within(&song.music.beats),
             downbeats: within(&song.music.downbeats),
         })

@@ -1,0 +1,102 @@
+//! The page of a study: `study.html` with the viewer's scripts, and the clips as JSON.
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+use super::{Question, StudyError};
+use crate::motion::Clip;
+use crate::report::viewer::{
+    MotionKind, PageData, SCENE_SCRIPTS, STYLE, Viewer, ViewerBody, ViewerMotion, embedded_json,
+    filled,
+};
+
+const TEMPLATE: &str = include_str!("study.html");
+const OWN_STYLE: &str = include_str!("study.css");
+const STAGE: &str = include_str!("stage.js");
+const SCRIPTS: [&str; 3] = [
+    include_str!("order.js"),
+    include_str!("answers.js"),
+    include_str!("study.js"),
+];
+
+/// What the page's scripts read.
+#[derive(Serialize)]
+pub(super) struct StudyPage<'s> {
+    pub study: &'s str,
+    /// Where songs begin, s.
+    pub skip: f64,
+    pub questions: Vec<PageQuestion>,
+    /// Where the page finds each song.
+    pub songs: Vec<String>,
+    pub clips: Vec<PageClip>,
+}
+
+#[derive(Serialize)]
+pub(super) struct PageQuestion {
+    name: &'static str,
+    text: &'static str,
+    ends: [&'static str; 2],
+    sound: bool,
+    pair: bool,
+}
+
+/// What is shown of a dance: for questions about one clip, for those about two pieces.
+#[derive(Serialize)]
+pub(super) struct PageClip {
+    pub id: String,
+    pub song: Option<usize>,
+    pub whole: Option<PageData>,
+    pub pair: Option<PageData>,
+}
+
+impl From<Question> for PageQuestion {
+    fn from(question: Question) -> Self {
+        Self {
+            name: question.name(),
+            text: question.text(),
+            ends: question.ends(),
+            sound: question.has_sound(),
+            pair: question.is_of_pairs(),
+        }
+    }
+}
+
+impl PageClip {
+    /// Pieces of a dance side by side, all of one length; `A`, `B` where there are several.
+    pub(super) fn shown(dance: &Clip, pieces: &[Range<usize>]) -> Result<PageData, StudyError> {
+        let names: &[&str] = if pieces.len() > 1 { &["A", "B"] } else { &[""] };
+        let motions = pieces.iter().zip(names).map(|(piece, name)| {
+            let clip = Clip {
+                poses: dance.poses[piece.clone()].to_vec(),
+                ..dance.clone()
+            };
+            let contacts = vec![[false; 4]; piece.len()];
+            ViewerMotion::from_clip(*name, MotionKind::Model, &clip, contacts)
+        });
+        let viewer = Viewer {
+            title: dance.name.clone(),
+            frame_time: dance.frame_time,
+            body: ViewerBody::of(&dance.skeleton),
+            motions: motions.collect(),
+            keyframes: Vec::new(),
+            asked: None,
+            music: None,
+        };
+        Ok(viewer.data()?)
+    }
+}
+
+impl StudyPage<'_> {
+    pub(super) fn html(&self) -> String {
+        let scene = [&SCENE_SCRIPTS[..], &[STAGE]].concat().concat();
+        let style = [STYLE, OWN_STYLE].concat();
+        let (data, script) = (embedded_json(self), SCRIPTS.concat());
+        filled(TEMPLATE, |place| match place {
+            "style" => style.trim_end().into(),
+            "data" => data.as_str().into(),
+            "scene" => scene.trim_end().into(),
+            _ => script.trim_end().into(),
+        })
+    }
+}
