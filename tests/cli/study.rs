@@ -34,11 +34,11 @@ impl Dances {
         self.folder.path().join(name)
     }
 
-    /// `keydance study page` of the models Ada and Grace, into `out`.
+    /// `keydance study page` of the models Lovelace and Hopper, into `out`.
     fn page(&self, out: &str, more: &[&str]) -> Command {
         let mut command = keydance("study");
         command.arg("page");
-        for (name, folder) in [("Ada", "first"), ("Grace", "second")] {
+        for (name, folder) in [("Lovelace", "first"), ("Hopper", "second")] {
             let folder = self.path(folder);
             command
                 .arg("--model")
@@ -82,7 +82,14 @@ fn the_page_tells_neither_model_nor_dance_and_the_key_tells_both() {
     dances.page("study", &SILENT).assert().success();
     let (page, key) = (dances.text("study/study.html"), dances.key("study"));
     let study = data_of(&page);
-    for telling in ["Ada", "Grace", "first/", "second/", "choreography", ".bvh"] {
+    for telling in [
+        "Lovelace",
+        "Hopper",
+        "first/",
+        "second/",
+        "choreography",
+        ".bvh",
+    ] {
         assert!(!page.contains(telling), "{telling}");
     }
     let clips = key["clips"].as_object().unwrap();
@@ -202,10 +209,10 @@ fn what_makes_no_study_is_said_and_nothing_is_written() {
         "has 57 frames behind the first 0.1 s",
     );
     refused(
-        &silent(&["--model", "Ada=."]),
-        "two models are called \"Ada\"",
+        &silent(&["--model", "Lovelace=."]),
+        "two models are called \"Lovelace\"",
     );
-    refused(&silent(&["--model", "Ada"]), "expected NAME=FOLDER");
+    refused(&silent(&["--model", "Lovelace"]), "expected NAME=FOLDER");
     refused(
         &silent(&["--model", "Empty=nowhere"]),
         "the dances of Empty",
@@ -220,7 +227,7 @@ fn what_makes_no_study_is_said_and_nothing_is_written() {
     };
     fs::remove_file(of("bvh").unwrap()).unwrap();
     let name = of("bvh").unwrap().file_name().unwrap().to_str().unwrap();
-    refused(&SILENT, &format!("Grace lacks {name}, which Ada has"));
+    refused(&SILENT, &format!("Hopper lacks {name}, which Lovelace has"));
     fs::copy(dances.path("first").join(name), of("bvh").unwrap()).unwrap();
     fs::remove_file(of("wav").unwrap()).unwrap();
     let music = dances.path("second").display().to_string();
@@ -352,12 +359,16 @@ fn a_page_plays_goes_back_keeps_what_was_rated_and_goes_on_after_a_reload() {
           sessionStorage.setItem('again', 'yes');
           location.reload();
         } else {
-          leave(document.getElementById('place').textContent + '\\n' + saved());
+          setTimeout(() => {
+            const place = document.getElementById('place').textContent;
+            leave([place, document.documentElement.dataset.playing, saved()].join('\\n'));
+          }, 300);
         }";
     let (loaded, left) = driven(&browser, &page, script);
     assert!(loaded.console().is_empty(), "{:?}", loaded.console());
     // The second was rated anew, the third passed over; it is the first without a rating.
-    let (place, csv) = left.split_once('\n').unwrap();
+    let (place, rest) = left.split_once('\n').unwrap();
+    let (playing, csv) = rest.split_once('\n').unwrap();
     assert!(place.starts_with("Question 1 of 2, clip 3 of 4"), "{place}");
     let mut reader = csv::Reader::from_reader(csv.as_bytes());
     let rated: Vec<_> = reader
@@ -372,11 +383,36 @@ fn a_page_plays_goes_back_keeps_what_was_rated_and_goes_on_after_a_reload() {
         rated,
         expected.map(|(order, rating)| (order.into(), rating.into()))
     );
-    assert_eq!(
-        loaded.attribute("data-playing"),
-        Some("true"),
-        "a clip plays when it is shown"
-    );
+    assert_eq!(playing, "true", "a clip plays when it is shown");
+}
+
+#[test]
+fn what_is_about_the_music_cannot_be_rated_where_it_cannot_be_heard() {
+    let Some(browser) = browser::browser() else {
+        return;
+    };
+    let dances = Dances::new("2", "90");
+    let music = dances.music();
+    let more = [
+        "--music",
+        &music,
+        "--questions",
+        "naturalness,appropriateness",
+    ];
+    dances.page("study", &more).assert().success();
+    for file in fs::read_dir(dances.path("first")).unwrap() {
+        fs::remove_file(file.unwrap().path()).unwrap();
+    }
+    let script = "
+        begin('3');
+        for (const key of ['1', '2', '3', '4']) press(key);
+        setTimeout(() => {
+          press('5');
+          leave(document.getElementById('summary').textContent);
+        }, 1000);";
+    let (loaded, left) = driven(&browser, &dances.path("study/study.html"), script);
+    assert!(left.starts_with("The music cannot be played"), "{left}");
+    assert_eq!(loaded.attribute("data-rated"), Some("4"));
 }
 
 /// A key of models with a clip each, named as the model and `-clip`.

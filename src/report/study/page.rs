@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::{Question, StudyError};
@@ -72,7 +73,9 @@ impl PageClip {
                 ..dance.clone()
             };
             let contacts = vec![[false; 4]; piece.len()];
-            ViewerMotion::from_clip(*name, MotionKind::Model, &clip, contacts)
+            let mut motion = ViewerMotion::from_clip(*name, MotionKind::Model, &clip, contacts);
+            centre(&mut motion.positions);
+            motion
         });
         let viewer = Viewer {
             title: dance.name.clone(),
@@ -84,6 +87,18 @@ impl PageClip {
             music: None,
         };
         Ok(viewer.data()?)
+    }
+}
+
+/// Moves a motion, `[frames][joints]`, so that the box round its root's path lies over the origin:
+/// one view shows two pieces of a dance that wanders.
+fn centre(frames: &mut [Vec<DVec3>]) {
+    let roots = || frames.iter().filter_map(|joints| joints.first());
+    let low = roots().fold(DVec3::INFINITY, |low, &root| low.min(root));
+    let high = roots().fold(DVec3::NEG_INFINITY, |high, &root| high.max(root));
+    let middle = (low + high) / 2.0 * DVec3::new(1.0, 0.0, 1.0);
+    for place in frames.iter_mut().flatten() {
+        *place -= middle;
     }
 }
 

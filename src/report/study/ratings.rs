@@ -58,14 +58,14 @@ pub fn read_ratings(files: &[PathBuf], key: &StudyKey) -> Result<Vec<Rating>, St
 
 /// The ratings of one file with their lines, from 1 on.
 fn read(file: &Path, key: &StudyKey) -> Result<Vec<(u64, Rating)>, StudyError> {
-    let text = fs::read(file).map_err(FileError::at(file, "read"))?;
+    let text = fs::read_to_string(file).map_err(FileError::at(file, "read"))?;
     let no_table = |source| StudyError::Table {
         file: file.into(),
         source,
     };
     let mut reader = ReaderBuilder::new()
         .trim(Trim::All)
-        .from_reader(text.as_slice());
+        .from_reader(text.as_bytes());
     let header = reader.headers().map_err(no_table)?.clone();
     let place = |column: &str| {
         let found = header.iter().position(|title| title == column);
@@ -86,7 +86,7 @@ fn read(file: &Path, key: &StudyKey) -> Result<Vec<(u64, Rating)>, StudyError> {
     ];
     let rating = |record: Result<StringRecord, csv::Error>| {
         let record = record.map_err(no_table)?;
-        let line = record.position().map_or(0, Position::line);
+        let line = record.position().map_or(0, |start| line_of(&text, start));
         let cells = columns.map(|column| record.get(column).unwrap_or_default());
         let rating = rating_of(cells, key).map_err(|problem| {
             StudyError::Refused(format!("{}, line {line}: {problem}", file.display()))
@@ -94,6 +94,13 @@ fn read(file: &Path, key: &StudyKey) -> Result<Vec<(u64, Rating)>, StudyError> {
         Ok((line, rating))
     };
     reader.records().map(rating).collect()
+}
+
+/// The line of a row that begins at a place or behind empty lines there.
+fn line_of(text: &str, start: &Position) -> u64 {
+    let rest = text.as_bytes().iter().skip(start.byte() as usize);
+    let empty = rest.take_while(|byte| b"\r\n".contains(byte));
+    start.line() + empty.filter(|byte| **byte == b'\n').count() as u64
 }
 
 /// The rating in a line's cells; what is wrong with them.

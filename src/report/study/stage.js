@@ -31,6 +31,8 @@ function play(playing) {
   refresh();
 }
 
+// It would follow the first dancer alone.
+if (motions.length > 1) camera.follow = false;
 readColours();
 refresh();
 return {

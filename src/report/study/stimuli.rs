@@ -29,13 +29,6 @@ pub(super) fn stimuli(
     models: &[StudyModel],
     music: Option<&Path>,
 ) -> Result<Vec<Stimulus>, StudyError> {
-    let folders = models.iter().map(|StudyModel { name, folder }| {
-        clip_files(folder).map_err(|source| StudyError::Dances {
-            model: name.clone(),
-            source,
-        })
-    });
-    let folders: Vec<BTreeMap<String, PathBuf>> = folders.collect::<Result<_, _>>()?;
     for (index, StudyModel { name, .. }) in models.iter().enumerate() {
         if models[..index].iter().any(|earlier| earlier.name == *name) {
             return Err(StudyError::Refused(format!(
@@ -43,6 +36,13 @@ pub(super) fn stimuli(
             )));
         }
     }
+    let folders = models.iter().map(|StudyModel { name, folder }| {
+        clip_files(folder).map_err(|source| StudyError::Dances {
+            model: name.clone(),
+            source,
+        })
+    });
+    let folders: Vec<BTreeMap<String, PathBuf>> = folders.collect::<Result<_, _>>()?;
     let Some((first, others)) = folders.split_first() else {
         let problem = "a study needs at least one model with its dances";
         return Err(StudyError::Refused(problem.into()));

@@ -19,10 +19,15 @@ function dataOf({ question, clip }) {
 
 function begin(participant) {
   const [items, answers] = [itemsOf(participant), keptAnswers(participant)];
-  const open = items.findIndex((item) => !answers[answerOf(item)]);
-  session = { participant, items, answers, at: open < 0 ? items.length : open };
+  session = { participant, items, answers, at: items.length };
   element("welcome").hidden = true;
-  show();
+  goTo(firstUnrated());
+}
+
+/** Where there is none, the end. */
+function firstUnrated() {
+  const at = session.items.findIndex((item) => !session.answers[answerOf(item)]);
+  return at < 0 ? session.items.length : at;
 }
 
 function goTo(at) {
@@ -73,7 +78,8 @@ function showProgress() {
   }
   element("back").disabled = at === 0;
   element("progress").textContent = `${rated} of ${items.length} rated`;
-  element("thanks").textContent = rated === items.length ? "Everything is rated. Thank you!" : `${items.length - rated} clips were passed over; go back to rate them.`;
+  element("next").textContent = answer ? "Next" : "Pass over";
+  element("thanks").textContent = rated === items.length ? "Everything is rated. Thank you!" : `Passed over: ${items.length - rated}. You may go back and rate what is missing.`;
   const csv = csvOf(participant, items, answers);
   for (const link of document.querySelectorAll("a.ratings")) {
     link.href = `data:text/csv;charset=utf-8,${encodeURIComponent(csv)}`;
@@ -132,7 +138,7 @@ function prepare() {
   element("play").addEventListener("click", () => viewer && viewer.toggle());
   element("back").addEventListener("click", () => goTo(session.at - 1));
   element("next").addEventListener("click", () => goTo(session.at + 1));
-  element("again").addEventListener("click", () => goTo(session.items.length - 1));
+  element("again").addEventListener("click", () => goTo(Math.min(firstUnrated(), session.items.length - 1)));
   addEventListener("keydown", onKey);
   new ResizeObserver(() => viewer && viewer.refresh()).observe(element("scene"));
 }
