@@ -41,7 +41,7 @@
 //! - [`experiment`] - configs in layers, rows, whole tables reproduced.
 //! - [`evaluation`] - metrics, scores, a file a protocol, tables.
 //! - [`synthesis`] - what a model gives becomes motion that can be played.
-//! - [`report`] - charts, the motion viewer, the figures of papers.
+//! - [`report`] - charts, the motion viewer, the figures of papers, the user study.
 //! - [`cli`] - the subcommands of the binary: arguments and printing only.
 //!
 //! > Training knows steps. A paper knows its data. A protocol knows scores. A request knows what is

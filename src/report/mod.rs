@@ -1,5 +1,5 @@
 //! Figures as SVG text: curves of losses and scores, and dancers side by side; the motion viewer as
-//! HTML.
+//! HTML, and the page of a user study.
 //!
 //! A figure knows numbers and positions only, no model and no training; the figures of a paper in
 //! [`figures`] ask models for them.

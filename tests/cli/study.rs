@@ -194,6 +194,10 @@ fn what_makes_no_study_is_said_and_nothing_is_written() {
     };
     refused(&[], "appropriateness is about the music: name the folder");
     refused(&["--questions", "beauty"], "invalid value 'beauty'");
+    refused(
+        &["--questions", "diversity,naturalness,diversity"],
+        "diversity is asked twice",
+    );
     let silent = |more: &[&'static str]| [&SILENT[..], more].concat();
     refused(
         &silent(&["--seconds", "0.5"]),
@@ -359,10 +363,11 @@ fn a_page_plays_goes_back_keeps_what_was_rated_and_goes_on_after_a_reload() {
           sessionStorage.setItem('again', 'yes');
           location.reload();
         } else {
-          setTimeout(() => {
+          // Behind the page's own drawing of the first frame.
+          requestAnimationFrame(() => {
             const place = document.getElementById('place').textContent;
             leave([place, document.documentElement.dataset.playing, saved()].join('\\n'));
-          }, 300);
+          });
         }";
     let (loaded, left) = driven(&browser, &page, script);
     assert!(loaded.console().is_empty(), "{:?}", loaded.console());

@@ -116,6 +116,15 @@ impl StudyRequest {
         if self.questions.is_empty() {
             return refused("a study asks at least one question".into());
         }
+        let mut questions = self.questions.iter().enumerate();
+        let twice = |(index, question): &(usize, &Question)| {
+            let earlier = &self.questions[..*index];
+            earlier.contains(question)
+        };
+        if let Some((_, question)) = questions.find(twice) {
+            let question = question.name();
+            return refused(format!("{question} is asked twice; ask each question once"));
+        }
         let heard = self.questions.iter().find(|question| question.has_sound());
         match heard.filter(|_| self.music.is_none()) {
             Some(question) => refused(format!(
