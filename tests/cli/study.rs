@@ -492,12 +492,7 @@ fn means_intervals_and_tests_are_those_of_scipy_and_statsmodels() {
     let question = &analysis["questions"][0];
     // scipy 1.17.1: numpy's mean and std(ddof=1), t.interval, f_oneway.
     let models = [
-        (
-            4.25,
-            0.7071067811865476,
-            3.6588439371018042,
-            4.841156062898196,
-        ),
+        (4.25, 0.5_f64.sqrt(), 3.6588439371018042, 4.841156062898196),
         (
             2.857142857142857,
             0.6900655593423541,
@@ -506,7 +501,7 @@ fn means_intervals_and_tests_are_those_of_scipy_and_statsmodels() {
         ),
         (
             1.6666666666666667,
-            0.7071067811865476,
+            0.5_f64.sqrt(),
             1.123136279517638,
             2.2101970538156954,
         ),
