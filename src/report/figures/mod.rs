@@ -48,7 +48,7 @@ impl FigureRequest<'_> {
     ///
     /// # Errors
     /// There are some.
-    fn without_rows(&self) -> Result<(), ReportError> {
+    pub fn without_rows(&self) -> Result<(), ReportError> {
         match self.rows {
             [] => Ok(()),
             _ => Err(ReportError::Refused(

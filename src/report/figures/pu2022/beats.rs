@@ -38,7 +38,8 @@ pub fn figure_7(
         for (delta, rate) in &points {
             numbers.add(row, format!("beat_hit_rate_within_{delta}"), *rate, "%");
         }
-        said.extend(rates.at(DELTA).map(|rate| format!("{row} {rate:.1} %")));
+        let within = rates.at(DELTA);
+        said.extend(within.map(|rate| format!("{row} {rate:.1}\u{a0}%")));
         lines.push(Line {
             name: row.into(),
             emphasised: true,
@@ -56,10 +57,12 @@ pub fn figure_7(
     }
     let mut caption = format!(
         "Figure 7. Beat hit rate of {name} on the test clips over δ; within {DELTA} frames: {}. \
-         Chance: the recorded dances with shifted beats.",
+         Chance: the recorded dances with shifted beats. The rate is hits over beats of the music, \
+         so a motion with more beats of its own has a higher one by chance.",
         said.join(", ")
     );
-    if let Some(note) = printed.note.as_ref().filter(|_| paper.is_some()) {
+    let dashed = lines.iter().any(|line| line.dashed);
+    if let Some(note) = printed.note.as_ref().filter(|_| dashed) {
         caption += &format!(" {note}");
     }
     let svg = Chart {

@@ -87,7 +87,10 @@ impl<'p> Grid<'p> {
                 .cells
                 .iter()
                 .filter(|cell| cell.ours.is_some() == there);
-            let names = cells.map(|cell| format!("λ = {} with σ = {}", cell.lambda, cell.sigma));
+            let names = cells.map(|cell| {
+                let (lambda, sigma) = (equals("λ", cell.lambda), equals("σ", cell.sigma));
+                format!("{lambda} with {sigma}")
+            });
             names.collect::<Vec<_>>()
         };
         let (there, not) = (names(true), names(false));
@@ -112,6 +115,11 @@ fn score(name: &str, metric: &str, rows: &[TableRow]) -> Option<f64> {
 /// The score of a row over all windows.
 pub fn score_of(row: &TableRow, metric: &str) -> Option<f64> {
     row.scores.as_ref()?.by(PROTOCOL)?.row(metric)?.at(ALL)
+}
+
+/// "λ = 5", which no line breaks.
+pub fn equals(symbol: &str, value: f64) -> String {
+    format!("{symbol}\u{a0}=\u{a0}{value}")
 }
 
 /// None of nothing.

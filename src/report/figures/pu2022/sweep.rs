@@ -1,6 +1,6 @@
 //! Figures 5 and 6: scores of tables 1 to 4 over lambda, a line for each sigma and size.
 
-use super::grid::{Grid, SIGMAS, mean, score_of};
+use super::grid::{Grid, SIGMAS, equals, mean, score_of};
 use crate::counted::counted;
 use crate::evaluation::music_dance::MusicDance;
 use crate::evaluation::{EvaluationOptions, Metric, PrintedTables, Protocol as _, TableRow};
@@ -115,26 +115,6 @@ impl Drawing {
         self.lacking.extend(grid.lacking(ours));
         let seeds = grid.seeds();
         let start = mean(&seeds);
-        if let (Some(start), [least, .., most] | [least @ most]) = (start, &seeds[..]) {
-            let count = counted(seeds.len(), "seed");
-            let row = format!("{ours}, lambda 0");
-            let measures = [("mean", start), ("least", *least), ("most", *most)];
-            for (of, value) in measures {
-                let measure = format!("{}_{of}", metric.key);
-                self.numbers.add(&row, measure, value, metric.unit);
-            }
-            let ends = [least, most].map(|value| shown(metric, *value));
-            self.seeds
-                .push(format!("{ours} {} to {}, {count}", ends[0], ends[1]));
-            self.lines.push(Line {
-                name: format!("{ours}, λ = 0, {count}"),
-                dots: true,
-                ..Line::plain(
-                    seeds.iter().map(|&seed| (0.0, seed)).collect(),
-                    COLOURS * size,
-                )
-            });
-        }
         for (index, sigma) in SIGMAS.into_iter().enumerate() {
             let later = grid.ours(sigma);
             let Some(&(lambda, end)) = later.last() else {
@@ -142,23 +122,50 @@ impl Drawing {
             };
             if let Some(start) = start {
                 let [from, to] = [start, end].map(|value| shown(metric, value));
-                let change = format!("{ours}, σ = {sigma}: {from} to {to} at λ = {lambda}");
+                let sigma = equals("σ", sigma);
+                let change = format!("{ours}, {sigma}: {from} to {to} at {}", equals("λ", lambda));
                 self.changes.push(change);
             }
             let start = start.map(|start| (0.0, start)).into_iter();
             let colour = COLOURS * size + 1 + index;
             self.lines.push(Line {
-                name: format!("{ours}, σ = {sigma}"),
+                name: format!("{ours}, {}", equals("σ", sigma)),
                 emphasised: true,
                 dots: true,
                 ..Line::plain(start.chain(later).collect(), colour)
             });
             self.lines.push(Line {
-                name: format!("{papers}, σ = {sigma}, paper"),
+                name: format!("{papers}, {}, paper", equals("σ", sigma)),
                 dashed: true,
                 ..Line::plain(grid.paper(sigma), colour)
             });
         }
+        if let Some(start) = start {
+            self.add_seeds(size, &seeds, start, metric);
+        }
+    }
+
+    /// Scores at lambda 0, ascending, and their mean: drawn over the lines that begin at it.
+    fn add_seeds(&mut self, size: usize, seeds: &[f64], mean: f64, metric: &Metric) {
+        let [ours, _] = SIZES[size];
+        let count = counted(seeds.len(), "seed");
+        let (least, most) = (seeds[0], seeds[seeds.len() - 1]);
+        let row = format!("{ours}, lambda 0");
+        for (of, value) in [("mean", mean), ("least", least), ("most", most)] {
+            let measure = format!("{}_{of}", metric.key);
+            self.numbers.add(&row, measure, value, metric.unit);
+        }
+        let [least, most] = [least, most].map(|value| shown(metric, value));
+        self.seeds.push(match seeds {
+            [_] => format!("{ours} {least}, {count}"),
+            _ => format!("{ours} {least} to {most}, {count}"),
+        });
+        let points = seeds.iter().map(|&seed| (0.0, seed));
+        self.lines.push(Line {
+            name: format!("{ours}, {}, {count}", equals("λ", 0.0)),
+            dots: true,
+            ..Line::plain(points.collect(), COLOURS * size)
+        });
     }
 
     fn caption(
@@ -174,7 +181,8 @@ impl Drawing {
         );
         if !self.seeds.is_empty() {
             caption += &format!(
-                " At λ = 0 the loss has no σ, so lines begin at the mean of its seeds ({}).",
+                " At {} the loss has no σ, so lines begin at the mean of its seeds ({}).",
+                equals("λ", 0.0),
                 self.seeds.join("; ")
             );
         }

@@ -1,5 +1,6 @@
 //! Figure 4: how much a frame weighs in the loss.
 
+use super::grid::equals;
 use crate::models::pu2022::{LossConfig, Pu2022Settings, WindowConfig, frame_weights};
 use crate::report::ReportError;
 use crate::report::chart::{Axis, Chart, Line};
@@ -21,10 +22,8 @@ pub fn figure_4(asked: &FigureRequest<'_>) -> Result<Figure, ReportError> {
     let settings = asked.subject.config.model.downcast_ref::<Pu2022Settings>();
     let window = settings.map_or_else(WindowConfig::default, |it| it.window.clone());
     let generated = window.generated();
-    let keys: Vec<usize> = (1..=KEYS)
-        .map(|key| window.seed + key * generated / KEYS)
-        .map(|after| after - 1)
-        .collect();
+    let keys = (1..=KEYS).map(|key| window.seed - 1 + key * generated / KEYS);
+    let keys: Vec<usize> = keys.collect();
     let mut numbers = Numbers::default();
     let mut lines = Vec::new();
     for (colour, (lambda, sigma)) in PAIRS.into_iter().enumerate() {
@@ -38,7 +37,7 @@ pub fn figure_4(asked: &FigureRequest<'_>) -> Result<Figure, ReportError> {
             .zip(weights)
             .map(|(frame, weight)| (f64::from(frame), weight));
         lines.push(Line {
-            name: format!("λ = {lambda}, σ = {sigma}"),
+            name: format!("{}, {}", equals("λ", lambda), equals("σ", sigma)),
             ..Line::plain(points.collect(), colour)
         });
     }
