@@ -464,6 +464,57 @@ fn a_model_of_positions_alone_is_scored_by_the_rotations_that_fit_them() {
     assert!(at(&scores.scores, "key_pose_error", "all") < 0.5);
 }
 
+/// The dance of a request with its root walking along X, slowest at these frames.
+fn slow_at(request: &Request, beats: &[usize]) -> Motion {
+    let from = &request.given[59].pose;
+    let mut poses: Vec<Pose> = request.given[..60].iter().map(|it| it.pose.clone()).collect();
+    let mut place = from.translations[0];
+    for frame in 60..request.frames {
+        let away = beats.iter().map(|beat| beat.abs_diff(frame)).min();
+        place.x += away.unwrap_or(0).min(8) as f64;
+        let mut pose = from.clone();
+        pose.translations[0] = place;
+        poses.push(pose);
+    }
+    motion(&request.skeleton, poses)
+}
+
+#[test]
+fn beats_that_a_dance_keeps_to_are_hit_more_often_than_shifted_ones_and_others_are_not() {
+    let mut data = made_up(900, |_| {});
+    // At distances of which no shift repeats many.
+    let beats: Vec<usize> = (0..36).map(|beat| 20 * beat + beat * beat / 6 + 65).collect();
+    let music = data.test[0].music.as_ref().unwrap();
+    let music = Arc::new(Analysis {
+        beats: beats.clone(),
+        ..Analysis::clone(music)
+    });
+    for recording in &mut data.test {
+        recording.music = Some(music.clone());
+    }
+    // Windows are of no concern to the beats.
+    let rates = |late: usize| {
+        let late: Vec<usize> = beats.iter().map(|beat| beat + late).collect();
+        let scores = evaluate(&model(|request| slow_at(request, &late)), &data).scores;
+        [2, 3].map(|delta| {
+            let of = |metric| at(&scores, metric, &delta.to_string());
+            [of("beat_hit_rate"), of("beat_hit_rate_shifted")]
+        })
+    };
+    for [hits, shifted] in rates(0) {
+        assert!(hits > 90.0 && shifted < 70.0, "{hits} {shifted}");
+    }
+    for [hits, shifted] in rates(9) {
+        assert!(hits < shifted, "{hits} {shifted}");
+    }
+    // Of the recorded dance the bound lies above the mean over the same shifts.
+    let scores = evaluate(&model(|request| recorded(&data, request)), &data).scores;
+    for delta in ["1", "2", "3", "4", "5"] {
+        let of = |metric| at(&scores, metric, delta);
+        assert!(of("beat_hit_rate_shifted") > of("beat_hit_rate_chance"));
+    }
+}
+
 #[test]
 fn other_extrema_are_other_beats() {
     let data = made_up(425, |_| {});
