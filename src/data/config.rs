@@ -1,5 +1,7 @@
 //! The `[data]` table of an experiment's config.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::motion::{FeatureConfig, Mapping, Unit, Up};
@@ -33,6 +35,10 @@ pub struct DataConfig {
     /// folder `audio`.
     #[serde(skip_serializing_if = "is_default")]
     pub music: bool,
+    /// Which extrema of the joints' mean speed are the beats of a motion, where they are scored
+    /// against those of its music.
+    #[serde(skip_serializing_if = "is_default")]
+    pub motion_beats: BeatExtrema,
     /// Frames a second of the files, whatever their headers say.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source_fps: Option<f64>,
@@ -63,6 +69,7 @@ impl Default for DataConfig {
             unit: Unit::Auto,
             up: Up::Auto,
             music: false,
+            motion_beats: BeatExtrema::Minima,
             source_fps: None,
             skip_frames: 0,
         }
@@ -76,6 +83,28 @@ impl DataConfig {
             contact_threshold: self.contact_threshold,
             facing_sigma: self.facing_sigma,
         }
+    }
+}
+
+/// Which extrema of the mean joint speed are the beats of a motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BeatExtrema {
+    /// Where the body comes to rest, as in the public tools of AIST++.
+    #[default]
+    Minima,
+    Maxima,
+    /// "Extrema", as Pu and Shan say.
+    Both,
+}
+
+impl fmt::Display for BeatExtrema {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Minima => "minima",
+            Self::Maxima => "maxima",
+            Self::Both => "minima and maxima",
+        })
     }
 }
 

@@ -13,7 +13,7 @@ mod split;
 mod twins;
 mod windows;
 
-pub use config::{DataConfig, Split};
+pub use config::{BeatExtrema, DataConfig, Split};
 pub use dataset::{DataError, Dataset, NamedFrames, Recording};
 pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};

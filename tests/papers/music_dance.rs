@@ -9,7 +9,6 @@ use glam::{DQuat, DVec3};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataConfig, DataPart, Dataset, Split};
 use keydance::evaluation::music_dance::MusicDance;
-use keydance::evaluation::music_dance::beats::BeatExtrema;
 use keydance::evaluation::{Evaluation, EvaluationOptions, Protocol as _, Scores, TableRow};
 use keydance::evaluation::{PrintedTables, ProtocolScores, Tables};
 use keydance::experiment::ExperimentConfig;
@@ -467,7 +466,10 @@ fn a_model_of_positions_alone_is_scored_by_the_rotations_that_fit_them() {
 /// The dance of a request with its root walking along X, slowest at these frames.
 fn slow_at(request: &Request, beats: &[usize]) -> Motion {
     let from = &request.given[59].pose;
-    let mut poses: Vec<Pose> = request.given[..60].iter().map(|it| it.pose.clone()).collect();
+    let mut poses: Vec<Pose> = request.given[..60]
+        .iter()
+        .map(|it| it.pose.clone())
+        .collect();
     let mut place = from.translations[0];
     for frame in 60..request.frames {
         let away = beats.iter().map(|beat| beat.abs_diff(frame)).min();
@@ -483,7 +485,9 @@ fn slow_at(request: &Request, beats: &[usize]) -> Motion {
 fn beats_that_a_dance_keeps_to_are_hit_more_often_than_shifted_ones_and_others_are_not() {
     let mut data = made_up(900, |_| {});
     // At distances of which no shift repeats many.
-    let beats: Vec<usize> = (0..36).map(|beat| 20 * beat + beat * beat / 6 + 65).collect();
+    let beats: Vec<usize> = (0..36)
+        .map(|beat| 20 * beat + beat * beat / 6 + 65)
+        .collect();
     let music = data.test[0].music.as_ref().unwrap();
     let music = Arc::new(Analysis {
         beats: beats.clone(),
@@ -516,18 +520,17 @@ fn beats_that_a_dance_keeps_to_are_hit_more_often_than_shifted_ones_and_others_a
 }
 
 #[test]
-fn other_extrema_are_other_beats() {
+fn a_config_says_which_extrema_are_beats() {
     let data = made_up(425, |_| {});
-    let rate = |extrema| {
-        let protocol = MusicDance::new(&EvaluationOptions::default()).with_beats(extrema);
-        let scores = protocol
-            .evaluate(&HOLD, &data, DataPart::Test)
-            .unwrap()
-            .scores;
-        at(&scores, "beat_hit_rate_real", "5")
+    let rate = |extrema: &str| {
+        let hold = include_str!("../../experiments/pu2022/hold.toml");
+        let config =
+            ExperimentConfig::parse(&format!("{hold}motion_beats = \"{extrema}\"\n"), "a config");
+        let protocols = config.unwrap().protocols();
+        let scores = protocols[0].evaluate(&HOLD, &data, DataPart::Test).unwrap();
+        at(&scores.scores, "beat_hit_rate_real", "5")
     };
-    let [minima, maxima, both] =
-        [BeatExtrema::Minima, BeatExtrema::Maxima, BeatExtrema::Both].map(rate);
+    let [minima, maxima, both] = ["minima", "maxima", "both"].map(rate);
     assert!((minima + maxima - both).abs() < 1e-9);
     assert!(minima > 0.0 && maxima > 0.0);
 }

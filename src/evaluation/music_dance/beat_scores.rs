@@ -1,9 +1,8 @@
 //! Beats of whole clips: of the answer, of the recorded dance, and by chance.
 
-use super::beats::{
-    BeatExtrema, beat_alignment, beat_hit_rate, joint_speed, motion_beats, shifted_beats,
-};
+use super::beats::{beat_alignment, beat_hit_rate, joint_speed, motion_beats, shifted_beats};
 use super::window::Mean;
+use crate::data::BeatExtrema;
 use crate::motion::{Pose, Skeleton};
 
 /// Largest distance of a hit, frames; the columns of the hit rate are 1 to this.

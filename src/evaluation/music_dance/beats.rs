@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use rand::RngExt as _;
-use serde::{Deserialize, Serialize};
 
 use super::FRAMES_PER_SECOND;
+use crate::data::BeatExtrema;
 use crate::models::Streams;
 
 /// Standard deviation of the Gaussian that smooths the speed, frames.
@@ -15,18 +15,6 @@ const ALIGNMENT: f64 = 1.5;
 const SHIFTS: usize = 200;
 /// Least frames of a shift, either way round.
 const LEAST_SHIFT: usize = 30;
-
-/// Which extrema of the mean joint speed are the beats of a motion.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BeatExtrema {
-    /// Where the body comes to rest, as in the public tools of AIST++.
-    #[default]
-    Minima,
-    Maxima,
-    /// "Extrema", as Pu and Shan say.
-    Both,
-}
 
 /// Speed of the joints, a mean over them, from each frame to the next, in the unit of the
 /// positions per second; smoothed over time by [`smoothed`].

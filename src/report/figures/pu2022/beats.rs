@@ -2,7 +2,7 @@
 
 use super::stage::Stage;
 use crate::evaluation::music_dance::SEED;
-use crate::evaluation::music_dance::beats::{BeatExtrema, joint_speed, motion_beats};
+use crate::evaluation::music_dance::beats::{joint_speed, motion_beats};
 use crate::evaluation::{PrintedTables, Scores};
 use crate::models::Generator;
 use crate::report::chart::{Axis, Chart, Line};
@@ -98,7 +98,7 @@ pub fn figure_9(stage: &Stage, model: &dyn Generator) -> Result<Figure, ReportEr
     let mut said = Vec::new();
     let mut curve = |kind, label: &str, world| {
         let values = joint_speed(world);
-        let dots = motion_beats(&values, BeatExtrema::default());
+        let dots = motion_beats(&values, stage.motion_beats);
         let own = dots.iter().filter(|dot| **dot >= SEED);
         let near = |dot: &&usize| beats.iter().any(|beat| beat.abs_diff(**dot) <= DELTA);
         let (count, hits) = (own.clone().count(), own.filter(near).count());
@@ -132,9 +132,10 @@ pub fn figure_9(stage: &Stage, model: &dyn Generator) -> Result<Figure, ReportEr
     numbers.add("music", "beats", after as f64, "");
     let caption = format!(
         "Figure 9. Mean speed of the joints (smoothed) of the recorded dance and of {}'s over the \
-         onset strength of the music. Beats of a motion are the minima of its speed; after the \
-         seed, within {DELTA} frames of one of {after} music beats: {}.",
+         onset strength of the music. Beats of a motion are the {} of its speed; after the seed, \
+         within {DELTA} frames of one of {after} music beats: {}.",
         model.name(),
+        stage.motion_beats,
         said.join(", ")
     );
     let svg = BeatFigure {

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::LENGTH;
 use crate::counted::counted;
-use crate::data::Recording;
+use crate::data::{BeatExtrema, Recording};
 use crate::evaluation::music_dance::{SEED, key_frames, window_question};
 use crate::models::generator::Request;
 use crate::models::pu2022::{WindowFrame, pose_of};
@@ -29,6 +29,8 @@ pub struct Stage<'d> {
     frames: Range<usize>,
     /// The next test clip by name, the first after the last: the second seed is its middle.
     next: &'d Clip,
+    /// Which extrema of the joints' mean speed are the beats of a motion.
+    pub motion_beats: BeatExtrema,
 }
 
 impl<'d> Stage<'d> {
@@ -87,6 +89,7 @@ impl<'d> Stage<'d> {
             recording,
             frames: start..start + frames,
             next: &clips[(shown + 1) % clips.len()].clip,
+            motion_beats: asked.subject.config.data.motion_beats,
         })
     }
 
