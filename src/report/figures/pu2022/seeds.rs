@@ -36,8 +36,8 @@ pub fn figure_8(stage: &Stage, model: &dyn Generator) -> Result<Figure, ReportEr
     let caption = format!(
         "Figure 8. One song and its key poses (framed) as recorded and as {} dances them after two \
          seeds, every {EVERY} frames: the recorded one, and {}, turned and moved to end where that \
-         one does. Mean joint distance about the root at the key poses {:.1} and {:.1}\u{a0}cm, between \
-         the two dances {apart:.1}\u{a0}cm.",
+         one does. Mean joint distance about the root at the key poses {:.1} and \
+         {:.1}\u{a0}cm, between the two dances {apart:.1}\u{a0}cm.",
         model.name(),
         stage.other_seed(),
         misses[0],
