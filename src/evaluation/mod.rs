@@ -4,10 +4,14 @@
 #[cfg(feature = "papers")]
 pub mod equations;
 #[cfg(feature = "papers")]
+pub mod frechet;
+#[cfg(feature = "papers")]
 pub mod in_betweening;
 mod metric;
 #[cfg(feature = "papers")]
 pub mod music_dance;
+#[cfg(feature = "papers")]
+pub mod pair_distance;
 mod printed;
 pub mod protocol;
 mod protocol_table;

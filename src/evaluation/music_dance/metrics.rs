@@ -4,9 +4,11 @@ use Better::{Higher, Lower, Neither};
 use ndarray::Array2;
 
 use super::beat_scores::{BeatScores, ClipBeats};
-use super::frechet::{Standardisation, diversity, frechet_distance};
 use super::smoothness::median;
+use super::standardisation::Standardisation;
 use super::window::{AllAndNovel, Character, Errors, Mean};
+use crate::evaluation::frechet::frechet_distance;
+use crate::evaluation::pair_distance::mean_pair_distance;
 use crate::evaluation::{Better, Metric, ScoreRow};
 
 /// The column of a score that has one value, over all windows or clips.
@@ -267,6 +269,9 @@ fn compare(
     rows.single(fid, frechet_distance(made.view(), real.view()));
     rows.single(floor, frechet_distance(train.view(), real.view()));
     for (key, set) in spreads.into_iter().zip(&sets) {
-        rows.single(key, diversity(set.view()).filter(|mean| mean.is_finite()));
+        rows.single(
+            key,
+            mean_pair_distance(set.view()).filter(|mean| mean.is_finite()),
+        );
     }
 }

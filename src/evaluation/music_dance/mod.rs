@@ -4,13 +4,12 @@
 //! - [`consistency`]: how well key poses are kept to (eq. 13), and distances about the root;
 //! - [`smoothness`] (eq. 16), [`jerk`]: how evenly a dance moves;
 //! - [`beats`]: hit rate, alignment and what chance gives;
-//! - [`kinetic`], [`geometric`], [`frechet`]: features of a window, FID and diversity.
+//! - [`kinetic`], [`geometric`], [`standardisation`]: features of a window, for FID and diversity.
 
 mod answer;
 mod beat_scores;
 pub mod beats;
 pub mod consistency;
-pub mod frechet;
 pub mod geometric;
 pub mod jerk;
 pub mod kinetic;
@@ -19,6 +18,7 @@ mod paper;
 mod relations;
 mod request;
 pub mod smoothness;
+pub mod standardisation;
 mod window;
 
 use std::ops::Range;
