@@ -18,6 +18,8 @@ mod protocol_table;
 #[cfg(feature = "papers")]
 pub mod published;
 mod record;
+#[cfg(feature = "papers")]
+pub mod sampled_dance;
 pub mod scores;
 pub mod tables;
 #[cfg(feature = "papers")]

@@ -97,6 +97,24 @@ impl Svg {
         ));
     }
 
+    /// Filled rectangles, `(upper left corner, size)` each, that lie side by side without seams.
+    pub fn rectangles(&mut self, all: &[([f64; 2], [f64; 2])], fill: &str) {
+        if all.is_empty() {
+            return;
+        }
+        let mut outline = String::new();
+        for ([x, y], [width, height]) in all {
+            let _ = write!(
+                outline,
+                "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}z"
+            );
+        }
+        let fill = escape(fill);
+        self.push(format_args!(
+            r#"<path d="{outline}" fill="{fill}" shape-rendering="crispEdges"/>"#
+        ));
+    }
+
     /// A line through the points with round joins.
     pub fn line(&mut self, points: &[[f64; 2]], stroke: Stroke) {
         let mut list = String::new();

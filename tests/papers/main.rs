@@ -5,6 +5,8 @@
 mod generated_data;
 #[path = "../common/lafan1_data.rs"]
 mod lafan1_data;
+#[path = "../common/motorica_data.rs"]
+mod motorica_data;
 #[path = "../common/music_dance_data.rs"]
 mod music_dance_data;
 #[path = "../common/real_data.rs"]
@@ -38,6 +40,7 @@ mod ranges;
 mod retrieval;
 mod root_frame;
 mod rotations;
+mod sampled_dance;
 mod schedule;
 mod step_batches;
 mod synthesis;

@@ -8,6 +8,8 @@ mod numbers;
 pub mod pan2021;
 #[cfg(feature = "papers")]
 pub mod pu2022;
+#[cfg(feature = "papers")]
+pub mod valleperez2021;
 
 pub use numbers::Numbers;
 

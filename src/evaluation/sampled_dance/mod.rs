@@ -1,0 +1,33 @@
+//! Scores of dances sampled from a model frame by frame, as functions of arrays: those of
+//! Valle-Perez et al. (2021), section 5, and what the paper says in words only.
+//!
+//! Dances are their raw motion columns, `[frames, columns]` in cm and rad, or, where a function
+//! says so, these standardised by the training part. Seeds are left out by who calls.
+//!
+//! - [`frechet`]: FPD and FMD (table 2), in two forms;
+//! - [`kinematic_beats`], [`beat_alignment`] (table 3), [`tempogram`] (figure 3);
+//! - [`prompting`]: what a seed's style does (table 4);
+//! - [`freezing`], [`divergence`], [`diversity`], [`step`]: how dances go wrong.
+
+pub mod beat_alignment;
+pub mod divergence;
+pub mod diversity;
+pub mod frechet;
+pub mod freezing;
+pub mod kinematic_beats;
+mod metrics;
+pub mod prompting;
+pub mod step;
+pub mod tempogram;
+
+pub use metrics::METRICS;
+
+/// The column of the root's height, cm.
+pub const HEIGHT: usize = 2;
+
+/// The share of dances of which something holds, %. None of no dance.
+#[must_use]
+pub fn share(dances: &[bool]) -> Option<f64> {
+    let holds = dances.iter().filter(|holds| **holds).count();
+    (!dances.is_empty()).then(|| 100.0 * holds as f64 / dances.len() as f64)
+}

@@ -1,0 +1,3 @@
+//! Figures of Valle-Perez et al., from numbers.
+
+pub mod tempograms;
