@@ -65,6 +65,14 @@ pub struct Clip {
 }
 
 impl Skeleton {
+    /// Every joint at its offset, all rotations 0.
+    pub fn rest_pose(&self) -> Pose {
+        Pose {
+            translations: self.joints.iter().map(|joint| joint.offset).collect(),
+            rotations: vec![DQuat::IDENTITY; self.len()],
+        }
+    }
+
     /// World positions of the joints in every pose, `[poses][joints]`, cm.
     pub fn world_positions(&self, poses: &[Pose]) -> Vec<Vec<DVec3>> {
         let poses = poses.iter();

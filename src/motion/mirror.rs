@@ -39,15 +39,18 @@ pub fn mirror_image(clip: &Clip) -> Clip {
 
 /// The joint on the body's other side; one in the middle is its own partner.
 fn partner(skeleton: &Skeleton, joint: usize) -> usize {
-    let name = &skeleton.joints[joint].name;
-    let other_side = match (name.strip_prefix("Left"), name.strip_prefix("Right")) {
+    other_side(&skeleton.joints[joint].name)
+        .and_then(|name| skeleton.index_of(&name))
+        .unwrap_or(joint)
+}
+
+/// What the joint on the body's other side is called; none for one in the middle.
+pub(crate) fn other_side(name: &str) -> Option<String> {
+    match (name.strip_prefix("Left"), name.strip_prefix("Right")) {
         (Some(part), _) => Some(format!("Right{part}")),
         (_, Some(part)) => Some(format!("Left{part}")),
         _ => None,
-    };
-    other_side
-        .and_then(|name| skeleton.index_of(&name))
-        .unwrap_or(joint)
+    }
 }
 
 fn reflected_joint(joint: &Joint, partner: &Joint) -> Joint {
@@ -64,6 +67,6 @@ fn reflected(place: DVec3) -> DVec3 {
 }
 
 /// The rotation as seen in the mirror: about the reflected axis, the other way round.
-fn reflected_rotation(rotation: DQuat) -> DQuat {
+pub(crate) fn reflected_rotation(rotation: DQuat) -> DQuat {
     DQuat::from_xyzw(rotation.x, -rotation.y, -rotation.z, rotation.w)
 }

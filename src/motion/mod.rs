@@ -5,8 +5,10 @@
 
 pub mod bvh;
 pub mod clip;
+pub mod columns;
 pub mod contact;
 pub mod contact_foot;
+pub mod exponential_map;
 pub mod facing;
 pub mod features;
 pub mod fit;
@@ -27,6 +29,7 @@ pub mod units;
 pub mod velocity_factor;
 
 pub use clip::{Clip, Pose};
+pub use columns::{ColumnsError, GroundPlace, MotionColumns, NamedRotation};
 pub use contact_foot::{ContactRule, Feet, Foot, MissingJoint};
 pub use features::{FeatureConfig, FeatureError, features};
 pub use mapping::{Mapping, MappingError};

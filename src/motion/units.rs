@@ -125,7 +125,7 @@ impl Measured {
         let Some(body) = Body::of(&clip.skeleton) else {
             return Self::default();
         };
-        let rest = rest_pose(&clip.skeleton);
+        let rest = clip.skeleton.rest_pose();
         let step = clip.poses.len().div_ceil(SAMPLES).max(1);
         let sampled: Vec<&Pose> = clip.poses.iter().step_by(step).collect();
         let moved = median(sampled.iter().map(|pose| body.length(pose)));
@@ -206,7 +206,7 @@ fn scale(clip: &mut Clip, factor: f64) {
 /// the rest pose stands along Y already, it is the root that carries the motion's axes, and it
 /// alone is turned.
 pub(super) fn turn_z_up(clip: &mut Clip) {
-    let rest = rest_pose(&clip.skeleton);
+    let rest = clip.skeleton.rest_pose();
     let stands = |body: Body| body.rises(&clip.skeleton, &rest).y > STANDS;
     if Body::of(&clip.skeleton).is_some_and(stands) {
         let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
@@ -250,13 +250,6 @@ fn unit_of(height: f64) -> Option<Unit> {
     [Unit::M, Unit::In, Unit::Mm]
         .into_iter()
         .find(|unit| GROWN_UP.contains(&(height * unit.cm() / 100.0)))
-}
-
-fn rest_pose(skeleton: &Skeleton) -> Pose {
-    Pose {
-        translations: skeleton.joints.iter().map(|joint| joint.offset).collect(),
-        rotations: vec![DQuat::IDENTITY; skeleton.len()],
-    }
 }
 
 /// Where a skeleton has its head and its feet.
