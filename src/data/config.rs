@@ -124,6 +124,12 @@ pub enum Split {
     /// The 43 dances with music: which train, validate and test stands in the folder's
     /// `split.json`; their numbers and frames are checked.
     MusicDance,
+    /// The Motorica subset at 20 frames a second: the pieces of its `split.csv`; their frames are
+    /// checked. Its music comes as numbers.
+    Motorica,
+    /// Every folder inside the data folder is a data set: with a `split.json` as `music_dance`,
+    /// with a `split.csv` as `motorica`, else 0.8 of its clips train.
+    Mixed,
     /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest
     /// tests.
     Share(f64),

@@ -13,11 +13,16 @@ use thiserror::Error;
 
 use super::config::{DataConfig, Split};
 use super::folder::{clip_files, left_out};
+#[cfg(feature = "music")]
+use super::given_music::GivenMusic;
 use super::listed;
+use super::mixed;
+#[cfg(feature = "papers")]
+use super::motorica::load as motorica;
 #[cfg(feature = "music")]
 use super::pairs;
 use super::reading::{FileReading, grouped};
-use super::split::{Parts, check_dance_frames, check_music_dance_frames, lafan1_warning, split};
+use super::split::{Parts, check_dance_frames, check_frames, lafan1_warning, split};
 use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
@@ -32,6 +37,9 @@ pub struct Recording {
     /// What is heard in its music, from frame 0 of the motion on.
     #[cfg(feature = "music")]
     pub music: Option<Arc<Analysis>>,
+    /// What its data set says of its music where there is no sound.
+    #[cfg(feature = "music")]
+    pub given_music: Option<Arc<GivenMusic>>,
 }
 
 /// Frames of clips by the clip: each range from its first frame up to the one after its last.
@@ -129,6 +137,8 @@ pub enum DataError {
     },
     #[error("data.music = true: this build hears nothing; build with the feature music")]
     Deaf,
+    #[error("split = \"motorica\": this build does not read it; build with the feature papers")]
+    Unread,
     #[error("{path} is not what it should be: {problem}")]
     Listed { path: PathBuf, problem: String },
     #[cfg(feature = "music")]
@@ -151,6 +161,8 @@ impl Recording {
             clip,
             #[cfg(feature = "music")]
             music: None,
+            #[cfg(feature = "music")]
+            given_music: None,
         }
     }
 
@@ -189,6 +201,11 @@ impl Dataset {
     /// # Errors
     /// The folder has no BVH file, a file is bad, or the config does not fit what is there.
     pub fn load(folder: &Path, config: &DataConfig) -> Result<Self, DataError> {
+        match config.split {
+            Split::Motorica => return motorica(folder, config),
+            Split::Mixed => return mixed::load(folder, config),
+            _ => {}
+        }
         let files = clip_files(folder)?;
         let names: Vec<String> = files.keys().cloned().collect();
         let origin = format!("the data folder {}", folder.display());
@@ -200,7 +217,7 @@ impl Dataset {
         let mut dataset = Self::assemble(&names, &origin, config, listed, |name, mapping| {
             hear(read_clip(&files[name], name, mapping, config)?)
         })?;
-        dataset.named_frames = listed::named_frames(folder)?;
+        dataset.named_frames = listed::named_frames(folder, config.fps)?;
         dataset.warnings.extend(twins(&dataset)?);
         dataset.warnings.extend(left_out(folder));
         Ok(dataset)
@@ -278,11 +295,16 @@ impl Dataset {
             named_frames: BTreeMap::new(),
             warnings,
         };
-        check_music_dance_frames(&dataset, origin, config)?;
+        check_frames(&dataset, origin, config)?;
         check_dance_frames(&dataset, origin, config)?;
         dataset.warnings.extend(lafan1_warning(&dataset, config));
         Ok(dataset)
     }
+}
+
+#[cfg(not(feature = "papers"))]
+fn motorica(_folder: &Path, _config: &DataConfig) -> Result<Dataset, DataError> {
+    Err(DataError::Unread)
 }
 
 /// What gives a clip that was read its music, where the config asks for it.
@@ -369,7 +391,7 @@ fn pose_digest(clip: &Clip) -> String {
 }
 
 /// SHA-256 over clips by their names and digests, hexadecimal.
-fn digest<'a>(clips: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+pub(super) fn digest<'a>(clips: impl Iterator<Item = (&'a str, &'a str)>) -> String {
     let mut lines: Vec<(&str, &str)> = clips.collect();
     lines.sort_unstable();
     let list: String = lines

@@ -13,6 +13,9 @@ use super::split::Parts;
 /// Largest file of this kind, bytes.
 const LARGEST: u64 = 1 << 24;
 
+/// Frames a second that `novel.json` counts by.
+const FRAME_RATE: f64 = 30.0;
+
 /// Names without ending.
 #[derive(Deserialize)]
 struct Listed {
@@ -79,18 +82,26 @@ pub(super) fn among(parts: Parts, names: &[String], origin: &str) -> Result<Part
     Ok(parts)
 }
 
-/// Frames by name and clip: "novel", of `novel.json`, are those of poses that no training clip has.
+/// Frames by name and clip, at `fps` frames a second: "novel", of `novel.json`, are those of poses
+/// that no training clip has.
 ///
 /// # Errors
 /// The file is there and is none.
-pub(super) fn named_frames(folder: &Path) -> Result<BTreeMap<String, NamedFrames>, DataError> {
+pub(super) fn named_frames(
+    folder: &Path,
+    fps: f64,
+) -> Result<BTreeMap<String, NamedFrames>, DataError> {
     let path = folder.join("novel.json");
     if !path.is_file() {
         return Ok(BTreeMap::new());
     }
     let novel: BTreeMap<String, Vec<[usize; 2]>> = read(&path)?;
     let novel = novel.into_iter().map(|(name, ranges)| {
-        let ranges = ranges.into_iter().map(|[first, end]| first..end);
+        // The first frame that is not before the file's.
+        let frame = |frame: usize| (frame as f64 * (fps / FRAME_RATE) - 1e-9).ceil() as usize;
+        let ranges = ranges
+            .into_iter()
+            .map(|[first, end]| frame(first)..frame(end));
         (format!("{name}.bvh"), ranges.collect())
     });
     Ok(BTreeMap::from([("novel".into(), novel.collect())]))

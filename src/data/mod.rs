@@ -4,7 +4,12 @@ pub mod choreography;
 pub mod config;
 pub mod dataset;
 mod folder;
+#[cfg(feature = "music")]
+mod given_music;
 mod listed;
+mod mixed;
+#[cfg(feature = "papers")]
+pub mod motorica;
 #[cfg(feature = "music")]
 mod pairs;
 mod part;
@@ -17,6 +22,8 @@ pub use config::{BeatExtrema, DataConfig, Split};
 pub use dataset::{DataError, Dataset, NamedFrames, Recording};
 pub(crate) use dataset::{file_digest, hexadecimal};
 pub(crate) use folder::{clip_files, is_clip};
+#[cfg(feature = "music")]
+pub use given_music::GivenMusic;
 #[cfg(feature = "music")]
 pub use pairs::music_beside;
 #[cfg(feature = "papers")]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::dataset::{DataError, Recording};
 use super::folder::entries;
 use crate::counted::counted;
-use crate::music::{Analysis, Cache, HOP};
+use crate::music::{Analysis, Cache, FRAME_RATE, HOP};
 
 /// Folder of the sound files in a data folder; where it is not there they lie beside the dances.
 const SOUNDS: &str = "audio";
@@ -82,11 +82,13 @@ pub(super) fn with_music(
 }
 
 fn check_length(recording: &Recording, music: &Analysis, sound: &Path) -> Result<(), DataError> {
-    match music.frames() + 1 < recording.frames() {
+    let clip = &recording.clip;
+    let frames = (clip.poses.len() as f64 * clip.frame_time * FRAME_RATE).round() as usize;
+    match music.frames() + 1 < frames {
         false => Ok(()),
         true => Err(DataError::ShortMusic {
             dance: recording.name().into(),
-            frames: counted(recording.frames(), "frame"),
+            frames: counted(frames, "frame"),
             sound: sound.into(),
             heard: counted(music.samples / HOP, "frame"),
         }),

@@ -97,6 +97,14 @@ pub(super) fn split(
             let found = "is no folder with a split.json".to_string();
             return Err(misfit("split = \"music_dance\"".into(), found));
         }
+        Split::Motorica => {
+            let found = "is no folder with a split.csv".to_string();
+            return Err(misfit("split = \"motorica\"".into(), found));
+        }
+        Split::Mixed => {
+            let found = "is no folder of folders".to_string();
+            return Err(misfit("split = \"mixed\"".into(), found));
+        }
         Split::Share(share) => {
             if !(*share > 0.0 && *share < 1.0) {
                 let expected = "a share above 0 and below 1";
@@ -191,21 +199,30 @@ pub(super) fn lafan1_warning(dataset: &Dataset, config: &DataConfig) -> Option<S
     })
 }
 
-/// Clips and frames of the 43 dances with music: those that train, validate and test.
+/// Clips and frames that train, validate and test: of the 43 dances with music at 30 and at 20
+/// frames a second, of the Motorica subset.
 const MUSIC_DANCE: [(usize, usize); 3] = [(32, 60_749), (4, 9_160), (7, 14_341)];
+const MUSIC_DANCE_20: [(usize, usize); 3] = [(32, 40_487), (4, 6_104), (7, 9_558)];
+const MOTORICA: [(usize, usize); 3] = [(4, 6_720), (4, 1_200), (5, 3_653)];
 
-/// Checks clips and frames of the dances with music.
-pub(super) fn check_music_dance_frames(
+/// Checks clips and frames of a split that a file of the data lists.
+pub(super) fn check_frames(
     dataset: &Dataset,
     origin: &str,
     config: &DataConfig,
 ) -> Result<(), DataError> {
+    let (name, expected) = match config.split {
+        Split::MusicDance if config.fps == 20.0 => ("music_dance", MUSIC_DANCE_20),
+        Split::MusicDance => ("music_dance", MUSIC_DANCE),
+        Split::Motorica => ("motorica", MOTORICA),
+        _ => return Ok(()),
+    };
     let parts = [&dataset.train, &dataset.validation, &dataset.test];
     let found = parts.map(|clips| {
         let frames = clips.iter().map(Recording::frames);
         (clips.len(), frames.sum::<usize>())
     });
-    if config.split != Split::MusicDance || found == MUSIC_DANCE {
+    if found == expected {
         return Ok(());
     }
     let said = |parts: [(usize, usize); 3]| {
@@ -216,7 +233,7 @@ pub(super) fn check_music_dance_frames(
         )
     };
     Err(DataError::Split {
-        config: format!("split = \"music_dance\", which has {}", said(MUSIC_DANCE)),
+        config: format!("split = \"{name}\", which has {}", said(expected)),
         origin: origin.into(),
         found: format!(
             "gives {}; for other data, set data.split = {{ share = 0.8 }}",

@@ -153,6 +153,12 @@ pub trait Generator: Send + Sync {
         FeatureSet::default()
     }
 
+    /// Whether it reads the numbers that a data set gives of its music, in place of what is heard
+    /// in a sound.
+    fn reads_given_music(&self) -> bool {
+        false
+    }
+
     /// Most frames from one given pose to the next, both counted, that it answers; none where there
     /// is no bound.
     fn longest_span(&self) -> Option<usize> {

@@ -7,10 +7,13 @@
 //! - [`registry`]: the list of kinds;
 //! - [`transition`]: what the models of transitions between two keyframes share;
 //! - [`rotations`]: what the models of rotations on any skeleton share;
-//! - [`flow`]: what normalising flows share.
+//! - [`flow`]: what normalising flows share;
+//! - [`dance_features`]: what the models that sample a dance pose by pose share.
 
 #[cfg(feature = "papers")]
 pub mod baselines;
+#[cfg(feature = "papers")]
+pub mod dance_features;
 #[cfg(feature = "papers")]
 pub mod duan2022;
 pub mod exported_batch;

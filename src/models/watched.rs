@@ -44,6 +44,10 @@ impl Generator for Watched<'_> {
         self.model.music_features()
     }
 
+    fn reads_given_music(&self) -> bool {
+        self.model.reads_given_music()
+    }
+
     fn longest_span(&self) -> Option<usize> {
         self.model.longest_span()
     }

@@ -184,7 +184,7 @@ impl MotionColumns {
             row[Y] = pose.translations[0].y;
             for (number, (&joint, from)) in joints.iter().zip(&self.turning).enumerate() {
                 let local = match number {
-                    0 => DQuat::from_rotation_y(-place.heading) * pose.rotations[0],
+                    0 => without_heading(pose.rotations[0]),
                     _ => pose.rotations[joint],
                 };
                 let map = exponential_map(from.rotation.inverse() * local).to_array();
@@ -360,6 +360,12 @@ fn heading(rotation: DQuat) -> f64 {
     let across = rotation * DVec3::X;
     let forward = across.cross(DVec3::Y);
     forward.x.atan2(forward.z)
+}
+
+/// A root's rotation without its heading.
+#[must_use]
+pub fn without_heading(rotation: DQuat) -> DQuat {
+    DQuat::from_rotation_y(-heading(rotation)) * rotation
 }
 
 /// An angle in [-pi, pi).

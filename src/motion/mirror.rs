@@ -67,6 +67,6 @@ fn reflected(place: DVec3) -> DVec3 {
 }
 
 /// The rotation as seen in the mirror: about the reflected axis, the other way round.
-pub(crate) fn reflected_rotation(rotation: DQuat) -> DQuat {
+fn reflected_rotation(rotation: DQuat) -> DQuat {
     DQuat::from_xyzw(rotation.x, -rotation.y, -rotation.z, rotation.w)
 }

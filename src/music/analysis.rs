@@ -14,6 +14,7 @@ use super::peaks::onset_peaks;
 use super::sound::{FRAME_RATE, HOP, Sound};
 use super::spectrum::PowerSpectra;
 use super::tempo::tempo;
+use super::twentieths::Twentieths;
 
 /// What was heard in a sound of F = floor(samples / 735) frames, 30 a second; frame k is centred on
 /// sample 735 k.
@@ -44,6 +45,8 @@ pub struct Analysis {
     pub mfcc: Array2<f32>,
     /// Chroma [F, 12], from C, the largest of a frame 1.
     pub chroma: Array2<f32>,
+    /// What is heard every twentieth of a second.
+    pub twentieths: Twentieths,
 }
 
 impl Analysis {
@@ -94,6 +97,7 @@ impl Analysis {
             mfcc: kept(mfcc(mel.view()).view()),
             mel: kept(mel.view()),
             chroma: kept(chroma.view()),
+            twentieths: Twentieths::of(samples).single(),
         })
     }
 

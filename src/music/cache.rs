@@ -19,12 +19,13 @@ use super::error::MusicError;
 use super::mel::BANDS;
 use super::mfcc::COEFFICIENTS;
 use super::sound::HOP;
+use super::twentieths::{FLUX_BANDS, MEL_BANDS, Twentieths, twentieths};
 use crate::data::hexadecimal;
 use crate::run::{FileError, replace_file};
 
 const MAGIC: &[u8; 8] = b"KDMUSIC\0";
 /// To be raised whenever what is heard changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const CHECKSUM: usize = 32;
 /// Bytes of an hour's analysis, with room: lists grow as they are read.
 const LARGEST: usize = 1 << 28;
@@ -166,5 +167,10 @@ fn fits(analysis: &Analysis) -> bool {
         (analysis.mfcc.dim(), COEFFICIENTS),
         (analysis.chroma.dim(), PITCH_CLASSES),
     ];
-    frames == analysis.samples / HOP && sizes.iter().all(|&(dim, numbers)| dim == (frames, numbers))
+    let Twentieths { mel, flux } = &analysis.twentieths;
+    let twentieths = twentieths(analysis.samples);
+    frames == analysis.samples / HOP
+        && sizes.iter().all(|&(dim, numbers)| dim == (frames, numbers))
+        && mel.dim() == (twentieths, MEL_BANDS)
+        && flux.dim() == (twentieths, FLUX_BANDS)
 }

@@ -9,6 +9,13 @@ use super::analysis::Analysis;
 use super::chroma::PITCH_CLASSES;
 use super::mel::BANDS;
 use super::mfcc::COEFFICIENTS;
+use super::sound::FRAME_RATE;
+use super::twentieths::{self, FLUX_BANDS, MEL_BANDS, rises};
+
+/// Standard deviation of what a beat is in [`beat_curve`], s.
+const BEAT_WIDTH: f64 = 0.05;
+/// Onset strengths that vary less do not vary.
+const LEAST_DEVIATION: f64 = 1e-6;
 
 /// Which features, and in which order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
@@ -22,6 +29,13 @@ pub enum FeatureSet {
     Fact35,
     /// 128 bands of the mel spectrum, dB
     Mel128,
+    /// At 20 frames a second: 80 mel bands, onset strength, nearness of a beat and of a downbeat,
+    /// 8-band flux, of which a model takes two principal components (Valle-Perez et al. 2021)
+    Transflower91,
+    /// At 20 frames a second: onset strength, standardised, and nearness of a beat
+    #[serde(rename = "onset_beats")]
+    #[cfg_attr(feature = "cli", value(name = "onset_beats"))]
+    OnsetBeats,
 }
 
 impl FeatureSet {
@@ -32,6 +46,17 @@ impl FeatureSet {
             Self::Paper15 => PITCH_CLASSES + 3,
             Self::Fact35 => 1 + COEFFICIENTS + PITCH_CLASSES + 2,
             Self::Mel128 => BANDS,
+            Self::Transflower91 => MEL_BANDS + 3 + FLUX_BANDS,
+            Self::OnsetBeats => 2,
+        }
+    }
+
+    /// Frames a second.
+    #[must_use]
+    pub fn frame_rate(self) -> f64 {
+        match self {
+            Self::Paper15 | Self::Fact35 | Self::Mel128 => FRAME_RATE,
+            Self::Transflower91 | Self::OnsetBeats => twentieths::FRAME_RATE,
         }
     }
 
@@ -42,6 +67,10 @@ impl FeatureSet {
             Self::Paper15 => "12 chroma from C, beat, downbeat, onset strength",
             Self::Fact35 => "onset strength, 20 MFCC, 12 chroma from C, onset peak, beat",
             Self::Mel128 => "128 mel bands, dB",
+            Self::Transflower91 => {
+                "at 20 frames a second 80 mel bands, dB, onset strength, beat, downbeat, 8-band flux"
+            }
+            Self::OnsetBeats => "at 20 frames a second onset strength, beat",
         }
     }
 }
@@ -52,15 +81,19 @@ impl fmt::Display for FeatureSet {
             Self::Paper15 => "paper15",
             Self::Fact35 => "fact35",
             Self::Mel128 => "mel128",
+            Self::Transflower91 => "transflower91",
+            Self::OnsetBeats => "onset_beats",
         })
     }
 }
 
 impl Analysis {
-    /// The features of every frame [F, numbers], not standardised.
+    /// The features of every frame [F, numbers] at the set's frame rate, not standardised.
     ///
     /// In `paper15` beat and downbeat are exp(-0.5 d^2), d the frames to the nearest one; in
-    /// `fact35` peak and beat are 1 in their frames and 0 elsewhere.
+    /// `fact35` peak and beat are 1 in their frames and 0 elsewhere; in those of 20 frames a second
+    /// beat and downbeat are [`beat_curve`]s and the onset strength is that of
+    /// [`rises`](twentieths::rises), in `onset_beats` as [`accents`].
     ///
     /// # Panics
     /// A field of the analysis was given another number of frames than the others have.
@@ -92,8 +125,69 @@ impl Analysis {
                 at(&self.beats).view(),
             ]),
             FeatureSet::Mel128 => self.mel.clone(),
+            FeatureSet::Transflower91 => joined(&[
+                self.twentieths.mel.view(),
+                aview1(&self.slow_onset()).insert_axis(Axis(1)),
+                self.slow_curve(&self.beats).view(),
+                self.slow_curve(&self.downbeats).view(),
+                self.twentieths.flux.view(),
+            ]),
+            FeatureSet::OnsetBeats => joined(&[
+                aview1(&accents(&self.slow_onset())).insert_axis(Axis(1)),
+                self.slow_curve(&self.beats).view(),
+            ]),
         }
     }
+
+    /// Onset strength, 20 frames a second.
+    fn slow_onset(&self) -> Vec<f32> {
+        let onset = rises(self.twentieths.mel.mapv(f64::from).view());
+        onset.into_iter().map(|x| x as f32).collect()
+    }
+
+    /// Nearness of some frames of 1/30 s, 20 frames a second, [F, 1].
+    fn slow_curve(&self, marks: &[usize]) -> Array2<f32> {
+        let times: Vec<f64> = marks.iter().map(|&mark| mark as f64 / FRAME_RATE).collect();
+        let frames = self.twentieths.mel.nrows();
+        let curve = beat_curve(&times, frames, twentieths::FRAME_RATE);
+        column(frames, |frame| curve[frame])
+    }
+}
+
+/// exp(-(t - b)^2 / (2 x 0.05^2)) at the time t of every frame, b the nearest of some ascending
+/// times, s; 0 where there are none.
+#[must_use]
+pub fn beat_curve(times: &[f64], frames: usize, frame_rate: f64) -> Vec<f32> {
+    let at = |frame: usize| {
+        let time = frame as f64 / frame_rate;
+        let next = times.partition_point(|&beat| beat < time);
+        let around = times.iter().take(next + 1).skip(next.saturating_sub(1));
+        let nearest = around.map(|beat| (beat - time).abs()).reduce(f64::min);
+        nearest.map_or(0.0, |away| {
+            let deviations = away / BEAT_WIDTH;
+            (-0.5 * deviations * deviations).exp() as f32
+        })
+    };
+    (0..frames).map(at).collect()
+}
+
+/// log(1 + x) of onset strengths, with mean 0 and deviation 1 over the whole sound, so that those of
+/// different measures compare; 0 where they do not vary.
+#[must_use]
+pub fn accents(onset: &[f32]) -> Vec<f32> {
+    let logarithms: Vec<f64> = onset
+        .iter()
+        .map(|&x| f64::from(x).max(0.0).ln_1p())
+        .collect();
+    let count = logarithms.len().max(1) as f64;
+    let mean = logarithms.iter().sum::<f64>() / count;
+    let variance = logarithms.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+    let deviation = variance.sqrt();
+    let accent = |x: f64| match deviation > LEAST_DEVIATION {
+        true => ((x - mean) / deviation) as f32,
+        false => 0.0,
+    };
+    logarithms.into_iter().map(accent).collect()
 }
 
 fn column(frames: usize, value: impl Fn(usize) -> f32) -> Array2<f32> {

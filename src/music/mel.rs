@@ -8,12 +8,13 @@ use super::spectrum::{BINS, WINDOW};
 /// Bands of the mel spectrum.
 pub const BANDS: usize = 128;
 /// Power below which a band counts as this.
-const LEAST_POWER: f64 = 1e-10;
+pub(super) const LEAST_POWER: f64 = 1e-10;
 /// How far below a file's loudest band the quietest can be, dB.
-const RANGE: f64 = 80.0;
+pub(super) const RANGE: f64 = 80.0;
 
-/// Slaney's mel filters (librosa's `filters.mel`): 130 edges equally spaced in mel from 0 to 11,025
-/// Hz; triangle i rises from edge i to edge i + 1, falls to edge i + 2, and has the area 1.
+/// Slaney's mel filters (librosa's `filters.mel`): edges equally spaced in mel from 0 Hz on, two
+/// more than bands; triangle i rises from edge i to edge i + 1, falls to edge i + 2, and has the
+/// area 1.
 pub struct MelFilters {
     /// The first frequency of each triangle, and its weights from there.
     triangles: Vec<(usize, Vec<f64>)>,
@@ -26,10 +27,17 @@ impl Default for MelFilters {
 }
 
 impl MelFilters {
+    /// 128 bands up to 11,025 Hz.
     #[must_use]
     pub fn new() -> Self {
-        let top = to_mel(f64::from(RATE) / 2.0);
-        let edge = |i: usize| to_hertz(top * i as f64 / (BANDS + 1) as f64);
+        Self::up_to(BANDS, f64::from(RATE) / 2.0)
+    }
+
+    /// So many bands up to a frequency, Hz.
+    #[must_use]
+    pub fn up_to(bands: usize, hertz: f64) -> Self {
+        let top = to_mel(hertz);
+        let edge = |i: usize| to_hertz(top * i as f64 / (bands + 1) as f64);
         let triangle = |band: usize| {
             let (low, middle, high) = (edge(band), edge(band + 1), edge(band + 2));
             let weight = |bin: usize| {
@@ -43,11 +51,11 @@ impl MelFilters {
             (first, weights.take_while(|&weight| weight > 0.0).collect())
         };
         Self {
-            triangles: (0..BANDS).map(triangle).collect(),
+            triangles: (0..bands).map(triangle).collect(),
         }
     }
 
-    /// The power in each of the 128 bands of a spectrum of 1,025 frequencies.
+    /// The power in each of the bands of a spectrum of 1,025 frequencies.
     pub fn apply<'a>(&'a self, power: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         self.triangles.iter().map(|(first, weights)| {
             let below = power.get(*first..).unwrap_or_default();

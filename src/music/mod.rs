@@ -1,7 +1,7 @@
 //! What is heard in music: sound files, spectra, onsets, tempo, beats, downbeats, and the features
 //! of a frame. It knows nothing of dance.
 //!
-//! Everything is at 30 frames a second, 735 samples at 22,050 Hz, and equals librosa 0.11 with
+//! Everything but [`twentieths`] is at 30 frames a second, 735 samples at 22,050 Hz, and equals librosa 0.11 with
 //! `hop_length=735`, `n_fft=2048` and, for tempo and beats, `start_bpm=100`.
 //!
 //! ```
@@ -22,6 +22,7 @@
 //!
 //! - [`sound`], [`decode`]: a file's samples, one channel at 22,050 Hz;
 //! - [`spectrum`], [`mel`], [`chroma`], [`mfcc`], [`onset`], [`peaks`]: frame by frame;
+//! - [`twentieths`]: frame by frame at 20 a second;
 //! - [`tempo`], [`beats`], [`downbeats`]: over the whole sound;
 //! - [`analysis`], [`features`]: all of it, and as a model takes it;
 //! - [`cache`]: what was heard in a file, by the file's content.
@@ -45,6 +46,7 @@ pub mod sound;
 pub mod spectrum;
 mod summary;
 pub mod tempo;
+pub mod twentieths;
 mod wav;
 
 pub use analysis::Analysis;
@@ -54,4 +56,5 @@ pub use error::MusicError;
 pub use features::FeatureSet;
 pub use sound::{FRAME_RATE, HOP, RATE, Sound};
 pub use summary::Summary;
+pub use twentieths::Twentieths;
 pub use wav::write_wav;

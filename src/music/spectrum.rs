@@ -17,7 +17,7 @@ pub const BINS: usize = WINDOW / 2 + 1;
 ///
 /// Frame k is the window of 2,048 samples around sample 735 k, zeros where it reaches beyond the
 /// sound, times the periodic Hann window 0.5 - 0.5 cos(2 pi n / 2048): librosa's `stft` with
-/// `center=True, pad_mode="constant"`, squared.
+/// `center=True, pad_mode="constant"`, squared. Other windows and centres may be asked for.
 pub struct PowerSpectra<'a> {
     samples: &'a [f32],
     hann: Vec<f64>,
@@ -32,24 +32,34 @@ impl<'a> PowerSpectra<'a> {
     /// Of samples at 22,050 Hz.
     #[must_use]
     pub fn new(samples: &'a [f32]) -> Self {
-        let transform = RealFftPlanner::new().plan_fft_forward(WINDOW);
+        Self::with_window(samples, WINDOW)
+    }
+
+    /// The same through windows of another, even length.
+    #[must_use]
+    pub fn with_window(samples: &'a [f32], length: usize) -> Self {
+        let transform = RealFftPlanner::new().plan_fft_forward(length);
         Self {
             samples,
-            hann: hann(WINDOW),
+            hann: hann(length),
             windowed: transform.make_input_vec(),
             spectrum: transform.make_output_vec(),
             scratch: transform.make_scratch_vec(),
-            power: vec![0.0; BINS],
+            power: vec![0.0; length / 2 + 1],
             transform,
         }
     }
 
-    /// The squared magnitudes of a frame's 1,025 frequencies.
+    /// The squared magnitudes of a frame's frequencies.
     pub fn of(&mut self, frame: usize) -> &[f64] {
-        // Of the sound with zeros in front, so it begins half a window before the frame's centre.
-        let start = frame * HOP;
+        self.around(frame * HOP)
+    }
+
+    /// The squared magnitudes of the frequencies around a sample.
+    pub fn around(&mut self, centre: usize) -> &[f64] {
+        let half = self.hann.len() / 2;
         for (k, (into, weight)) in self.windowed.iter_mut().zip(&self.hann).enumerate() {
-            let sample = (start + k).checked_sub(WINDOW / 2);
+            let sample = (centre + k).checked_sub(half);
             let sample = sample.and_then(|at| self.samples.get(at));
             *into = weight * f64::from(sample.copied().unwrap_or(0.0));
         }

@@ -17,7 +17,7 @@ use crate::models::generator::{Given, Motion, NeededPoses, Request};
 use crate::models::{Generator, ModelError};
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, channel_layout};
 use crate::motion::{Clip, Mapping, MappingError, Pose};
-use crate::music::{Analysis, Cache, FRAME_RATE, MusicError};
+use crate::music::{Analysis, Cache, MusicError};
 
 /// Key poses nearer to the seed than this get a warning, frames.
 const NEAR: usize = 5;
@@ -103,10 +103,15 @@ pub enum SongError {
     #[error("{model} does not dance to music from a seed; give --keyframe or --motion alone")]
     Deaf { model: String },
     #[error(
-        "the model's data has {fps} frames a second and music is heard at {FRAME_RATE}; such a model \
+        "the model's data has {fps} frames a second and music is heard at {heard}; such a model \
          cannot dance to a song"
     )]
-    Rate { fps: f64 },
+    Rate { fps: f64, heard: f64 },
+    #[error(
+        "{model} reads the numbers that its data set gives of the music, which no song has; train a \
+         model of what is heard"
+    )]
+    Numbers { model: String },
     #[error(
         "a dance of {} to {song} is shorter than the seed, {}: give a longer song, or a later end",
         counted(*frames, "frame"),
@@ -140,14 +145,14 @@ pub enum SongError {
     },
     #[error(
         "the key pose {key} lies beyond the dance, whose last frame is {last} ({:.2} s)",
-        *last as f64 / FRAME_RATE
+        *last as f64 / fps
     )]
-    Beyond { key: String, last: usize },
+    Beyond { key: String, last: usize, fps: f64 },
     #[error(
         "the key pose {key} lies in the seed, whose last frame is {last} ({:.2} s); give a later time",
-        *last as f64 / FRAME_RATE
+        *last as f64 / fps
     )]
-    InSeed { key: String, last: usize },
+    InSeed { key: String, last: usize, fps: f64 },
     #[error("two key poses stand at frame {frame} of the result, {} and {}; keep one", keys[0], keys[1])]
     Twice { frame: usize, keys: [String; 2] },
     #[error("{model} gave no rotations")]
@@ -163,7 +168,9 @@ pub struct Song {
     /// What the model is asked.
     pub request: Request,
     pub music: Analysis,
-    /// Its file.
+    /// Frames a second of the dance.
+    pub fps: f64,
+    /// The song's file.
     pub file: PathBuf,
     /// T', frames of the seed.
     pub seed: usize,
@@ -190,20 +197,30 @@ impl Song {
             let model = model.name().into();
             return Err(SongError::Deaf { model });
         };
-        if data.fps != FRAME_RATE {
-            return Err(SongError::Rate { fps: data.fps });
+        if model.reads_given_music() {
+            let model = model.name().into();
+            return Err(SongError::Numbers { model });
+        }
+        let set = model.music_features();
+        if data.fps != set.frame_rate() {
+            return Err(SongError::Rate {
+                fps: data.fps,
+                heard: set.frame_rate(),
+            });
         }
         let heard = cache.analysis(&choice.music)?;
         let named = |notice| format!("{}: {notice}", choice.music.display());
         let mut notices: Vec<String> = heard.warnings.into_iter().map(named).collect();
         let music = heard.analysis;
-        let frames = music.frames().min(choice.frames.unwrap_or(usize::MAX));
+        let features = music.features(set);
+        let end = features.nrows();
+        let frames = end.min(choice.frames.unwrap_or(usize::MAX));
         let song = || choice.music.clone();
         if !music.has_onsets() {
             notices.push(format!("no beat is heard in {}", choice.music.display()));
         }
-        if let Some(wanted) = choice.frames.filter(|wanted| *wanted > music.frames()) {
-            let (song, end) = (choice.music.display(), music.frames());
+        if let Some(wanted) = choice.frames.filter(|wanted| *wanted > end) {
+            let song = choice.music.display();
             notices.push(format!("{song} ends at frame {end}, before frame {wanted}"));
         }
         if frames <= needed {
@@ -252,8 +269,7 @@ impl Song {
             pose,
             features: None,
         });
-        let heard = music.features(model.music_features());
-        let heard = heard.slice(ndarray::s![..frames, ..]).mapv(f64::from);
+        let heard = features.slice(ndarray::s![..frames, ..]).mapv(f64::from);
         let request = Request {
             given: given.collect(),
             music: Some(heard),
@@ -262,6 +278,7 @@ impl Song {
         Ok(Self {
             request,
             music,
+            fps: files.data.fps,
             file: choice.music.clone(),
             seed: needed,
             held,
@@ -326,14 +343,14 @@ impl Song {
             let distances = own.iter().zip(&wanted).map(|(a, b)| a.distance(*b));
             KeyPoseMiss {
                 frame,
-                seconds: frame as f64 / FRAME_RATE,
+                seconds: frame as f64 / self.fps,
                 distance: distances.sum::<f64>() / own.len() as f64,
             }
         });
         SongSummary {
             model: model.into(),
             frames: clip.poses.len(),
-            seconds: clip.poses.len() as f64 / FRAME_RATE,
+            seconds: clip.poses.len() as f64 / self.fps,
             tempo: self.music.tempo,
             metre: self.music.metre,
             seed_frames: self.seed,
@@ -419,6 +436,7 @@ impl Files {
             let FileKeyframe { file, frame, time } = key;
             format!("{}:{frame}@{time}", file.display())
         };
+        let fps = self.data.fps;
         let mut asked: Vec<&FileKeyframe> = asked.iter().collect();
         asked.sort_by_key(|key| key.time);
         if let Some(pair) = asked.windows(2).find(|pair| pair[0].time == pair[1].time) {
@@ -431,11 +449,11 @@ impl Files {
         for key in asked {
             if key.time >= frames {
                 let (key, last) = (title(key), frames - 1);
-                return Err(SongError::Beyond { key, last });
+                return Err(SongError::Beyond { key, last, fps });
             }
             if key.time < seed {
                 let (key, last) = (title(key), seed - 1);
-                return Err(SongError::InSeed { key, last });
+                return Err(SongError::InSeed { key, last, fps });
             }
             let mut pose = self.pose(&key.file, key.frame)?;
             if pose.translations.len() != dancer.translations.len() {

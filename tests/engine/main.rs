@@ -15,6 +15,7 @@ mod adam;
 mod autograd;
 mod bvh;
 mod choreography;
+mod columns;
 mod contact;
 mod contact_foot;
 mod dataset;

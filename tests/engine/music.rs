@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use std::fs;
 use std::path::PathBuf;
 
+use keydance::music::features::{accents, beat_curve};
+use keydance::music::twentieths::{Twentieths, rises};
 use keydance::music::{Analysis, Cache, FeatureSet, HOP, MusicError, RATE, Sound, parse};
 use ndarray::Array2;
 use ndarray_npy::ReadNpyExt as _;
@@ -436,4 +438,105 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn mel_bands_and_rises_at_20_frames_a_second_are_those_of_an_independent_program() {
+    let Some(folder) = dance_folder() else {
+        return;
+    };
+    let path = folder.join("../../spec/data/flow_example.json");
+    let Ok(json) = fs::read_to_string(&path) else {
+        eprintln!("skipped: no {}", path.display());
+        return;
+    };
+    let example: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let example = &example["audio"];
+    let numbers = |value: &serde_json::Value| -> Vec<f64> {
+        let list = value.as_array().unwrap().iter();
+        list.map(|it| it.as_f64().unwrap()).collect()
+    };
+    let count = example["samples"].as_u64().unwrap() as usize;
+    let mut samples = vec![0.0; count];
+    for tone in example["tones_amplitude_hz"].as_array().unwrap() {
+        let tone = numbers(tone);
+        for (n, sample) in samples.iter_mut().enumerate() {
+            *sample += tone[0] * (TAU * tone[1] * n as f64 / f64::from(RATE)).sin();
+        }
+    }
+    for click in numbers(&example["clicks"]) {
+        let from = click as usize;
+        for (n, sample) in samples[from..from + 64].iter_mut().enumerate() {
+            *sample += 0.8 * 0.9_f64.powi(n as i32);
+        }
+    }
+    let samples: Vec<f32> = samples.into_iter().map(|x| x as f32).collect();
+    let heard = Twentieths::of(&samples);
+    let expected = example["mel_db"].as_array().unwrap();
+    assert_eq!(heard.mel.dim(), (expected.len(), 80));
+    for (row, expected) in heard.mel.rows().into_iter().zip(expected) {
+        for (ours, theirs) in row.iter().zip(numbers(expected)) {
+            assert!((ours - theirs).abs() < 1e-6, "{ours} for {theirs}");
+        }
+    }
+    for (ours, theirs) in rises(heard.mel.view())
+        .iter()
+        .zip(numbers(&example["onset"]))
+    {
+        assert!((ours - theirs).abs() < 1e-6, "{ours} for {theirs}");
+    }
+}
+
+#[test]
+fn features_at_20_frames_a_second_have_beats_where_they_sound() {
+    let heard = Analysis::of(&bars(120.0, 4, 30)).unwrap();
+    let numbers = heard.features(FeatureSet::Transflower91);
+    assert_eq!(numbers.dim(), (600, 91));
+    // A beat every 10 frames, a bar every 40.
+    let peaks = |column: usize| -> Vec<usize> {
+        let column = numbers.column(column);
+        (0..600).filter(|&frame| column[frame] > 0.9).collect()
+    };
+    let (beats, downbeats) = (peaks(81), peaks(82));
+    assert!(beats.len() > 50 && beats.windows(2).all(|pair| pair[1] - pair[0] == 10));
+    assert_eq!(beats.len().div_ceil(4), downbeats.len());
+    assert!(
+        downbeats.iter().all(|frame| frame % 40 == 0),
+        "{downbeats:?}"
+    );
+    // Clicks rise in every band of the flux within 20 ms of the beat.
+    for &frame in &beats[1..50] {
+        let flux = numbers.slice(ndarray::s![frame, 83..]);
+        let between = numbers.slice(ndarray::s![frame + 5, 83..]);
+        assert!(
+            flux.sum() > 2.0 * between.sum(),
+            "{frame}: {flux} {between}"
+        );
+    }
+    let short = heard.features(FeatureSet::OnsetBeats);
+    assert_eq!(short.dim(), (600, 2));
+    assert_eq!(short.column(1), numbers.column(81));
+    let onset = short.column(0).mapv(f64::from);
+    assert!(onset.mean().unwrap().abs() < 1e-6 && (onset.std(0.0) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_beat_between_two_frames_of_20_a_second_is_near_both() {
+    let curve = beat_curve(&[0.125, 0.3], 8, 20.0);
+    let expected = |distance: f64| (-0.5 * (distance / 0.05).powi(2)).exp() as f32;
+    for (frame, distance) in [
+        (0, 0.125),
+        (2, 0.025),
+        (3, 0.025),
+        (4, 0.075),
+        (6, 0.0),
+        (7, 0.05),
+    ] {
+        assert!(
+            (curve[frame] - expected(distance)).abs() < 1e-6,
+            "{frame}: {curve:?}"
+        );
+    }
+    assert_eq!(beat_curve(&[], 3, 20.0), [0.0; 3]);
+    assert_eq!(accents(&[2.0; 4]), [0.0; 4]);
 }

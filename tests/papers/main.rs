@@ -21,6 +21,7 @@ mod small_training;
 mod baselines;
 mod config_layers;
 mod controls;
+mod dance_features;
 mod effect;
 mod golden;
 mod golden_run;

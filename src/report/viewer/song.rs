@@ -11,6 +11,7 @@ use crate::data::DataConfig;
 use crate::models::ModelError;
 use crate::models::transition::DanceClip;
 use crate::motion::Clip;
+use crate::music::FRAME_RATE;
 use crate::report::ReportError;
 use crate::run::FileError;
 use crate::synthesis::song::Song;
@@ -44,10 +45,9 @@ impl ViewerMusic {
     /// Its file cannot be read, or has no address that the page could name.
     fn of(song: &Song, frames: usize, sound: Sound<'_>) -> Result<Self, ReportError> {
         let name = song.file.file_name().unwrap_or_default();
-        let within = |beats: &[usize]| {
-            let inside = beats.iter().filter(|beat| **beat < frames);
-            inside.copied().collect()
-        };
+        // Beats are heard in frames of the music, and shown in those of the dance.
+        let frame = |beat: &usize| (*beat as f64 * song.fps / FRAME_RATE).round() as usize;
+        let within = |beats: &[usize]| beats.iter().map(frame).filter(|it| *it < frames).collect();
         Ok(Self {
             name: name.to_string_lossy().into(),
             source: sound.source(&song.file)?,

@@ -1,0 +1,103 @@
+//! From a request to a model's numbers, and from its numbers to a dance.
+
+use ndarray::{Array2, Array3, ArrayView2};
+
+use super::features::DanceFeatures;
+use crate::models::ModelError;
+use crate::models::generator::{Motion, Request};
+use crate::motion::{GroundPlace, Pose, Skeleton};
+
+/// A request in the numbers of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenDance<'r> {
+    /// The seed, standardised, `[seed, D]`.
+    pub motion: Array2<f32>,
+    /// The music, standardised, `[F, A]`, frame 0 at the seed's first frame; 0 where none is given.
+    pub audio: Array2<f32>,
+    skeleton: &'r Skeleton,
+    seed: Vec<Pose>,
+}
+
+impl DanceFeatures {
+    /// A request whose poses at frames 0 to `seed` - 1 are given; poses elsewhere are not heeded.
+    ///
+    /// # Errors
+    /// The seed, a joint or a number of the music is missing; another frame rate than that of the
+    /// training part.
+    pub fn given<'r>(
+        &self,
+        request: &'r Request,
+        seed: usize,
+    ) -> Result<GivenDance<'r>, ModelError> {
+        self.check_frame_time("the request", request.frame_time)?;
+        let joints = request.skeleton.len();
+        let pose_at = |frame: usize| {
+            let given = request.given.iter().find(|it| it.frame == frame as i64);
+            let given = given.ok_or_else(|| ModelError::Data {
+                reason: format!("the request has no pose at frame {frame} of its seed of {seed}"),
+            })?;
+            let pose = &given.pose;
+            match [pose.rotations.len(), pose.translations.len()] == [joints, joints] {
+                true => Ok(pose.clone()),
+                false => Err(ModelError::Shape {
+                    what: format!("the pose at frame {frame}"),
+                    expected: vec![joints, joints],
+                    found: vec![pose.rotations.len(), pose.translations.len()],
+                }),
+            }
+        };
+        let poses = (0..seed).map(pose_at).collect::<Result<Vec<_>, _>>()?;
+        let columns = self
+            .columns
+            .measure_poses("the request", &request.skeleton, &poses);
+        let columns = columns.map_err(|error| ModelError::data(&error))?;
+        Ok(GivenDance {
+            motion: self.motion.standardise(columns.view()),
+            audio: match &request.music {
+                Some(music) => self.standardised_music(music)?,
+                None => Array2::zeros((request.frames, self.audio.width())),
+            },
+            skeleton: &request.skeleton,
+            seed: poses,
+        })
+    }
+
+    /// The seed and what follows it: standardised columns `[frames, D]` of the frames after it,
+    /// which go on from where its last pose stands. [`Motion::raw`] has them in cm and rad.
+    ///
+    /// # Errors
+    /// There are other columns than D, or no seed.
+    pub fn motion(
+        &self,
+        given: &GivenDance<'_>,
+        generated: ArrayView2<f32>,
+    ) -> Result<Motion, ModelError> {
+        let no_seed = || ModelError::Data {
+            reason: "a dance without a seed has no pose to go on from".into(),
+        };
+        let width = self.columns.width();
+        if generated.ncols() != width {
+            return Err(ModelError::Shape {
+                what: "the generated frames".into(),
+                expected: vec![generated.nrows(), width],
+                found: generated.shape().to_vec(),
+            });
+        }
+        let last = given.seed.last().ok_or_else(no_seed)?;
+        let raw = self.motion.restore(generated);
+        let place = GroundPlace::of(last);
+        let rebuilt = self
+            .columns
+            .poses_after(raw.view(), given.skeleton, last, place);
+        let mut poses = given.seed.clone();
+        poses.extend(rebuilt.map_err(|error| ModelError::data(&error))?);
+        let world = given.skeleton.world_positions(&poses);
+        let shape = (poses.len(), given.skeleton.len(), 3);
+        let positions = Array3::from_shape_fn(shape, |(t, joint, axis)| world[t][joint][axis]);
+        Ok(Motion {
+            poses: Some(poses),
+            raw: Some(raw),
+            ..Motion::new(positions)
+        })
+    }
+}
