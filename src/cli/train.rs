@@ -15,6 +15,7 @@ use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
+use crate::models::weights::SavedWeights;
 use crate::run::RunFolder;
 use crate::training::{Outcome, Resumed, Trainer};
 
@@ -38,6 +39,10 @@ pub struct TrainArgs {
     /// break
     #[arg(long)]
     resume: bool,
+    /// Folder of a trained run whose weights it starts from, of the experiment that the config's
+    /// key start names; the run keeps a copy
+    #[arg(long, value_name = "RUN_DIR")]
+    start: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
 }
@@ -49,7 +54,15 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let mut out = io::stdout();
     let dataset = Dataset::load(&args.data, &config.data)?;
     warn(&dataset.warnings);
-    let mut trainer = Trainer::new(config.clone(), &dataset, args.threads.count())?;
+    let given = args.start.as_ref();
+    let given = given.map(|run| RunFolder::open(run).newest_weights());
+    let given = given.transpose()?;
+    let start = match &given {
+        Some(path) => Some(SavedWeights::read(path)?),
+        None => RunFolder::open(&args.out).start()?,
+    };
+    let threads = args.threads.count();
+    let mut trainer = Trainer::from_weights(config.clone(), &dataset, threads, start.as_ref())?;
     let (run, resumed) = if args.resume {
         let run = RunFolder::resume(&args.out, &config)?;
         let resumed = trainer.resume(&run)?;
@@ -57,6 +70,9 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     } else {
         (RunFolder::create(&args.out, &config)?, None)
     };
+    if let Some(weights) = &given {
+        run.keep_start(weights)?;
+    }
     describe(&trainer)?;
     if let Some(expected) = trainer.expected() {
         let expected = HumanDuration(expected.max(Duration::from_secs(1)));

@@ -26,6 +26,10 @@ pub struct ExperimentConfig {
     pub paper: Option<String>,
     /// What every random number of the training follows from; at most 2^63 - 1, as TOML has it.
     pub seed: u64,
+    /// Name of the experiment whose trained weights it starts from, with fresh moments; left out:
+    /// drawn ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<String>,
     pub data: DataConfig,
     /// `[model]`, and the other tables that are the model's own.
     #[serde(skip)]
@@ -49,6 +53,8 @@ pub(super) struct Shared {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paper: Option<String>,
     pub seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<String>,
     pub data: DataConfig,
     pub optimiser: AdamConfig,
     pub checkpoint: CheckpointConfig,
@@ -63,6 +69,7 @@ impl Default for Shared {
             name: "experiment".into(),
             paper: None,
             seed: 1,
+            start: None,
             data: DataConfig::default(),
             optimiser: AdamConfig::default(),
             checkpoint: CheckpointConfig::default(),
@@ -188,6 +195,9 @@ impl ExperimentConfig {
             &self.name,
             "letters, digits, '_', '-' and '.' only, at least one, beginning with a letter or digit",
         )?;
+        if let Some(name) = &self.start {
+            ValueError::unless(is_name(name), "start", name, "the name of an experiment")?;
+        }
         if let Some(name) = &self.paper {
             let papers = registry::papers();
             let known: Vec<&str> = papers.iter().map(|paper| paper.name).collect();

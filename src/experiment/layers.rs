@@ -328,6 +328,17 @@ fn resolve(layers: &[Layer]) -> Result<ExperimentConfig, ConfigError> {
             let of_others = |key: &str| others.iter().any(|it| it.defaults().contains_key(key));
             let rows = above.remove(ROWS);
             above.retain(|key, _| known.contains_key(key) || !of_others(key));
+            for (name, value) in &mut above {
+                let has = |defaults: &Table, key: &str| {
+                    let table = defaults.get(name).and_then(Value::as_table);
+                    table.is_some_and(|table| table.contains_key(key))
+                };
+                if let Some(table) = value.as_table_mut() {
+                    let of_others =
+                        |key: &str| others.iter().any(|other| has(&other.defaults(), key));
+                    table.retain(|key, _| has(&known, key) || !of_others(key));
+                }
+            }
             let name = table.get("name").and_then(Value::as_str);
             let name = name.unwrap_or(kind.default_name());
             let row = rows.as_ref().and_then(|rows| rows.get(name));
@@ -399,6 +410,7 @@ fn parse_layer(
         name: shared.name,
         paper: shared.paper,
         seed: shared.seed,
+        start: shared.start,
         data: shared.data,
         model: kind.read(given.clone()).map_err(unread)?,
         optimiser: shared.optimiser,

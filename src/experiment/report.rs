@@ -151,7 +151,7 @@ impl Reproduction<'_> {
         let record = results.read(row, self.dataset)?;
         let manifest = match record {
             Some(_) => results.folder.manifest()?,
-            None => self.run_of(row).manifest()?,
+            None => self.run_of(row)?.manifest()?,
         };
         Ok(Reported {
             row,

@@ -108,8 +108,10 @@ impl Reproduction<'_> {
             self.check(row)?;
         }
         let (next, diverged) = (AtomicUsize::new(0), Mutex::new(None));
+        let trainings: Vec<Mutex<()>> = self.rows.iter().map(|_| Mutex::new(())).collect();
         std::thread::scope(|scope| {
-            let jobs = (0..self.jobs).map(|_| scope.spawn(|| self.work(&next, &diverged)));
+            let job = || self.work(&next, &diverged, &trainings);
+            let jobs = (0..self.jobs).map(|_| scope.spawn(job));
             // All begin before one is waited for.
             let jobs: Vec<_> = jobs.collect();
             jobs.into_iter().try_for_each(|job| match job.join() {
@@ -130,11 +132,12 @@ impl Reproduction<'_> {
 
     /// Finishes row after row until none is left or the user asks to stop. `next` is the next of
     /// `chosen`: all are taken once a job has failed. `diverged` is the last training that did so;
-    /// it is held while the tables are written.
+    /// it is held while the tables are written. Each of `trainings` is held while its row trains.
     fn work(
         &self,
         next: &AtomicUsize,
         diverged: &Mutex<Option<TrainingError>>,
+        trainings: &[Mutex<()>],
     ) -> Result<(), ReproduceError> {
         while !self.observer.stop_asked() {
             let index = next.fetch_add(1, Ordering::Relaxed);
@@ -142,7 +145,7 @@ impl Reproduction<'_> {
                 break;
             };
             self.observer.row(row, index + 1, self.chosen.len())?;
-            let finished = self.finish(row);
+            let finished = self.finish(row, trainings);
             let mut diverged = diverged.lock().unwrap_or_else(PoisonError::into_inner);
             let outcome = match finished {
                 Err(ReproduceError::Training(error @ TrainingError::NonFinite { .. })) => {
@@ -162,18 +165,41 @@ impl Reproduction<'_> {
         Ok(())
     }
 
-    pub(super) fn run_of(&self, row: &Row) -> RunFolder {
-        RunFolder::open(&self.runs.join(&row.folder))
+    /// The first of the rows, by number, that is trained as this one is: rows that differ only in
+    /// what acts after the network share a training.
+    fn trained_as(&self, row: &Row) -> Result<usize, ReproduceError> {
+        for (number, other) in self.rows.iter().enumerate() {
+            let mut differences = other.config.training_differences(&row.config)?;
+            differences.retain(|difference| !difference.starts_with("name:"));
+            if differences.is_empty() {
+                return Ok(number);
+            }
+        }
+        Ok(0)
+    }
+
+    /// The run that a row's weights come from.
+    ///
+    /// # Errors
+    /// A config with a number that TOML does not have.
+    pub(super) fn run_of(&self, row: &Row) -> Result<RunFolder, ReproduceError> {
+        let trained = self.rows.get(self.trained_as(row)?).unwrap_or(row);
+        Ok(RunFolder::open(&self.runs.join(&trained.folder)))
     }
 
     /// Refuses results and runs of another config or other data, before anything is trained.
     fn check(&self, row: &Row) -> Result<(), ReproduceError> {
         RowResults::of(row, self.out).read(row, self.dataset)?;
-        let run = self.run_of(row);
+        let trained = self.rows.get(self.trained_as(row)?);
+        if trained.is_some_and(|trained| trained != row) {
+            // Its run is checked as that row's.
+            return Ok(());
+        }
+        let run = self.run_of(row)?;
         if !run.config_path().exists() {
             // The model, the schedule and the validation are refused here, not when hours of other
             // rows are over.
-            if row.is_trained() && !self.no_training {
+            if row.is_trained() && !self.no_training && row.config.start.is_none() {
                 let trainer = Trainer::new(row.config.clone(), self.dataset, 1);
                 trainer.map_err(|error| ReproduceError::Row {
                     row: row.folder.clone(),
@@ -196,9 +222,12 @@ impl Reproduction<'_> {
     }
 
     /// Trains and evaluates what is left of a row.
-    fn finish(&self, row: &Row) -> Result<(), ReproduceError> {
+    fn finish(&self, row: &Row, trainings: &[Mutex<()>]) -> Result<(), ReproduceError> {
         let results = RowResults::of(row, self.out);
-        let run = self.run_of(row);
+        let (trained_as, run) = (self.trained_as(row)?, self.run_of(row)?);
+        let training = trainings.get(trained_as);
+        // Another row with the same training may be at it: this one waits for it.
+        let _held = training.map(|it| it.lock().unwrap_or_else(PoisonError::into_inner));
         let finished = is_finished(run.manifest()?.as_ref());
         if let Some(record) = results.read(row, self.dataset)? {
             let protocols = row.config.protocols().into_iter();
@@ -227,7 +256,10 @@ impl Reproduction<'_> {
             if self.no_training {
                 return Ok(self.observer.note("not trained yet")?);
             }
-            if self.train(row)? == Outcome::Stopped {
+            let trained = self.rows.get(trained_as).unwrap_or(row);
+            if self.train_start(trained, trainings)? == Outcome::Stopped
+                || self.train(trained)? == Outcome::Stopped
+            {
                 return Ok(());
             }
         }
@@ -235,8 +267,46 @@ impl Reproduction<'_> {
         results.write(row, Some(&run), scores, self.dataset)
     }
 
+    /// The row whose weights another one starts from.
+    fn start_of(&self, row: &Row) -> Result<Option<(usize, &Row)>, ReproduceError> {
+        let Some(name) = &row.config.start else {
+            return Ok(None);
+        };
+        let mut rows = self.rows.iter().enumerate();
+        let found = rows.find(|(_, other)| other.config.name == *name);
+        let none = || {
+            ReproduceError::Refused(format!(
+                "{} starts from the weights of {name}, which is no row of the folder",
+                row.folder
+            ))
+        };
+        found.ok_or_else(none).map(Some)
+    }
+
+    /// Trains the row that another one starts from, where that is left.
+    fn train_start(&self, row: &Row, trainings: &[Mutex<()>]) -> Result<Outcome, ReproduceError> {
+        let Some((number, start)) = self.start_of(row)? else {
+            return Ok(Outcome::Finished);
+        };
+        let training = trainings.get(number);
+        let _held = training.map(|it| it.lock().unwrap_or_else(PoisonError::into_inner));
+        match is_finished(self.run_of(start)?.manifest()?.as_ref()) {
+            true => Ok(Outcome::Finished),
+            false => self.train(start),
+        }
+    }
+
     fn train(&self, row: &Row) -> Result<Outcome, ReproduceError> {
-        let mut trainer = Trainer::new(row.config.clone(), self.dataset, self.threads)?;
+        let start = match self.start_of(row)? {
+            Some((_, start)) => {
+                let run = self.run_of(start)?;
+                Some(run.saved_weights(&start.config)?)
+            }
+            None => None,
+        };
+        let config = row.config.clone();
+        let (dataset, threads) = (self.dataset, self.threads);
+        let mut trainer = Trainer::from_weights(config, dataset, threads, start.as_ref())?;
         self.observer.training(&trainer)?;
         let run = RunFolder::resume(&self.runs.join(&row.folder), &row.config)?;
         let resumed = trainer.resume(&run)?;

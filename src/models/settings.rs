@@ -178,6 +178,9 @@ pub struct TaskSetting<'d> {
     /// How the data was read, and how it is measured.
     pub data: DataConfig,
     pub streams: Streams,
+    /// Trained weights that the training starts from, with the statistics that they know the data
+    /// by; none where it starts from drawn ones.
+    pub start: Option<&'d SavedWeights>,
 }
 
 /// How a gradient check is drawn and how much of it is compared.

@@ -18,7 +18,10 @@ impl RunFolder {
     pub(crate) fn best(&self) -> Option<(u64, PathBuf)> {
         let step = |path: &Path| -> Option<u64> {
             let name = path.file_name()?.to_str()?;
-            name.strip_prefix(PREFIX)?.strip_suffix(ENDING)?.parse().ok()
+            name.strip_prefix(PREFIX)?
+                .strip_suffix(ENDING)?
+                .parse()
+                .ok()
         };
         let parts = self.parts().into_iter();
         parts.filter_map(|path| Some((step(&path)?, path))).max()
@@ -37,6 +40,7 @@ impl RunFolder {
 
     /// Removes them.
     pub(crate) fn remove_best(&self) -> Result<(), FileError> {
-        self.best().map_or(Ok(()), |(_, path)| durable::remove(&path))
+        self.best()
+            .map_or(Ok(()), |(_, path)| durable::remove(&path))
     }
 }

@@ -14,6 +14,8 @@ use crate::models::weights::{self, SavedWeights};
 
 /// Name of the weights file, in a checkpoint and in a finished run.
 pub const WEIGHTS_FILE: &str = "weights.safetensors";
+/// Name of the file with the weights that a run started from.
+pub const START_FILE: &str = "start.safetensors";
 /// Name of the file with the rest of the state.
 pub const STATE_FILE: &str = "state.bin";
 const PREFIX: &str = "step-";

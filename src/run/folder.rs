@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::best::is_best;
-use super::checkpoint::{self, WEIGHTS_FILE};
+use super::checkpoint::{self, START_FILE, WEIGHTS_FILE};
 use super::durable::{self, FileError};
 use super::error::RunError;
 use super::lock::{FolderLock, LOCK};
@@ -63,7 +63,7 @@ impl RunFolder {
         if run.config_path().exists() && run.config()?.name == config.name {
             durable::remove_folder(&run.checkpoints())?;
             run.remove_best()?;
-            for name in [MANIFEST, LOG, WEIGHTS_FILE, Self::CONFIG] {
+            for name in [MANIFEST, LOG, WEIGHTS_FILE, START_FILE, Self::CONFIG] {
                 durable::remove(&path.join(name))?;
             }
         }
@@ -108,11 +108,18 @@ impl RunFolder {
         let inside = file.strip_prefix(folder).ok();
         let name = inside.and_then(|inside| inside.iter().next());
         let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
-        let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE, LOCK];
-        let is_own =
-            own.contains(&&*name)
-                || is_best(&name)
-                || name.starts_with("evaluation") && name.ends_with(".json");
+        let own = [
+            Self::CONFIG,
+            MANIFEST,
+            LOG,
+            CHECKPOINTS,
+            WEIGHTS_FILE,
+            START_FILE,
+            LOCK,
+        ];
+        let is_own = own.contains(&&*name)
+            || is_best(&name)
+            || name.starts_with("evaluation") && name.ends_with(".json");
         is_own && folder.join(Self::CONFIG).is_file()
     }
 

@@ -1,8 +1,9 @@
 //! A run's model with the newest weights of its training.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::checkpoint::{self, WEIGHTS_FILE};
+use super::checkpoint::{self, START_FILE, WEIGHTS_FILE};
+use super::durable::{FileError, replace as replace_file};
 use super::error::RunError;
 use super::folder::RunFolder;
 use crate::data::Dataset;
@@ -53,6 +54,24 @@ impl RunFolder {
             .map_err(|error| self.or_other_version(error))
     }
 
+    /// The weights that the run started from, where it did not start from drawn ones.
+    ///
+    /// # Errors
+    /// Their file is damaged.
+    pub fn start(&self) -> Result<Option<SavedWeights>, RunError> {
+        let path = self.path().join(START_FILE);
+        match path.exists() {
+            true => Ok(Some(SavedWeights::read(&path)?)),
+            false => Ok(None),
+        }
+    }
+
+    /// Keeps a copy of the weights in a file that the run starts from.
+    pub(crate) fn keep_start(&self, weights: &Path) -> Result<(), RunError> {
+        let content = std::fs::read(weights).map_err(FileError::at(weights, "read"))?;
+        Ok(replace_file(&self.path().join(START_FILE), content)?)
+    }
+
     /// Training windows with what the run's newest weights make of them.
     ///
     /// # Errors
@@ -68,6 +87,7 @@ impl RunFolder {
             dataset,
             data: config.data.clone(),
             streams: Streams::new(config.seed),
+            start: None,
         };
         Ok(config.model.export_batch(&saved, &setting, options)?)
     }

@@ -59,9 +59,7 @@ impl Trainer<'_> {
         let mut parameters = self.parameters.clone();
         let loaded = saved.load_into(&mut parameters, &self.task.statistics());
         loaded.map_err(RunError::from)?;
-        let model = self
-            .task
-            .generator(&self.config.name, parameters.clone());
+        let model = self.task.generator(&self.config.name, parameters.clone());
         let scores = self.stepper.install(|| validation.score(&*model));
         let score = scores
             .map_err(|cause| TrainingError::Refused(format!("{}: {cause}", path.display())))

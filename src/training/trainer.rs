@@ -14,6 +14,7 @@ use crate::counted::counted;
 use crate::data::Dataset;
 use crate::experiment::ExperimentConfig;
 use crate::models::settings::{InitialRng, TaskSetting};
+use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Streams, Task, weights};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
@@ -56,8 +57,21 @@ impl<'d> Trainer<'d> {
         dataset: &'d Dataset,
         threads: usize,
     ) -> Result<Self, TrainingError> {
+        Self::from_weights(config, dataset, threads, None)
+    }
+
+    /// The same from trained weights, those of the experiment that the config starts from.
+    ///
+    /// # Errors
+    /// As [`Trainer::new`]; the weights are those of another model, or are missing.
+    pub fn from_weights(
+        config: ExperimentConfig,
+        dataset: &'d Dataset,
+        threads: usize,
+        start: Option<&'d SavedWeights>,
+    ) -> Result<Self, TrainingError> {
         let model = config.model.clone();
-        Self::with_task(config, dataset, threads, |setting, init| {
+        Self::begin(config, dataset, threads, start, |setting, init| {
             model.task(setting, init)
         })
     }
@@ -75,6 +89,35 @@ impl<'d> Trainer<'d> {
             &mut Initialiser<'_, f32, InitialRng>,
         ) -> Result<Box<dyn Task<f32> + 'd>, ModelError>,
     ) -> Result<Self, TrainingError> {
+        Self::begin(config, dataset, threads, None, task)
+    }
+
+    fn begin(
+        config: ExperimentConfig,
+        dataset: &'d Dataset,
+        threads: usize,
+        start: Option<&'d SavedWeights>,
+        task: impl FnOnce(
+            &TaskSetting<'d>,
+            &mut Initialiser<'_, f32, InitialRng>,
+        ) -> Result<Box<dyn Task<f32> + 'd>, ModelError>,
+    ) -> Result<Self, TrainingError> {
+        match (&config.start, start) {
+            (Some(name), None) => {
+                return Err(TrainingError::Refused(format!(
+                    "the config starts from the weights of {name}, and there are none: train {name}, \
+                     then give its run's folder to --start"
+                )));
+            }
+            (None, Some(start)) => {
+                return Err(TrainingError::Refused(format!(
+                    "{}: the config starts from drawn weights; name the experiment that these are of \
+                     by the key start",
+                    start.path.display()
+                )));
+            }
+            _ => {}
+        }
         config
             .validate()
             .map_err(|cause| TrainingError::Refused(format!("the config: {cause}")))?;
@@ -84,9 +127,14 @@ impl<'d> Trainer<'d> {
             dataset,
             data: config.data.clone(),
             streams,
+            start,
         };
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
         let task = task(&setting, &mut init)?;
+        if let Some(start) = start {
+            let loaded = start.load_into(&mut parameters, &task.statistics());
+            loaded.map_err(|error| TrainingError::Refused(format!("--start: {error}")))?;
+        }
         Ok(Self {
             config_toml: config.to_toml().map_err(RunError::from)?,
             dataset,

@@ -4,6 +4,7 @@ use std::fs;
 
 use keydance::data::Split;
 use keydance::experiment::ExperimentConfig;
+use keydance::models::moglow2020::MoglowSettings;
 use keydance::models::transition::{ModelConfig, TransitionSettings};
 
 fn settings(config: &ExperimentConfig) -> &TransitionSettings {
@@ -91,6 +92,22 @@ fn a_budget_is_over_models_of_any_kind_but_the_command_line_over_its_own() {
     fs::write(&budget, "scedule.fraction = 0.5").unwrap();
     let error = ExperimentConfig::load_under(&config, Some(&budget), &[]).unwrap_err();
     assert!(error.to_string().contains("scedule"), "{error}");
+}
+
+#[test]
+fn what_a_budget_says_of_keys_that_only_other_models_have_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, budget) = (folder.path().join("a.toml"), folder.path().join("b.toml"));
+    fs::write(&config, "model.kind = 'moglow2020'").unwrap();
+    // Both models have blocks, Transflower alone a width.
+    let text = "[model]\nwidth = 16\nblocks = 3\n[rows.moglow.model]\nhidden = 8";
+    fs::write(&budget, text).unwrap();
+    let read = ExperimentConfig::load_under(&config, Some(&budget), &[]).unwrap();
+    let model = read.model.downcast_ref::<MoglowSettings>().unwrap();
+    assert_eq!((model.model.blocks, model.model.hidden), (3, 8));
+    fs::write(&budget, "[model]\nwidht = 16").unwrap();
+    let error = ExperimentConfig::load_under(&config, Some(&budget), &[]).unwrap_err();
+    assert!(error.to_string().contains("widht"), "{error}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use keydance::models::transition::{Batch, Forcing, ModelConfig, Network, Transit
 use keydance::models::weights::SavedWeights;
 use keydance::run::checkpoint::{STATE_FILE, WEIGHTS_FILE, list};
 use keydance::run::state::decode;
-use keydance::run::{RunError, RunFolder, RunState};
+use keydance::run::{RunFolder, RunState};
 use keydance::training::{Outcome, StepReport, Trainer, TrainingError};
 use ndarray::Array3;
 use sha2::{Digest, Sha256};
@@ -205,7 +205,7 @@ fn killed_run(folder: &Path) -> PathBuf {
     path
 }
 
-fn finish(path: &Path) -> Result<(u64, Vec<String>, String), RunError> {
+fn finish(path: &Path) -> Result<(u64, Vec<String>, String), TrainingError> {
     let data = dataset();
     let mut trainer = trainer(&data, 2);
     let run = RunFolder::resume(path, trainer.config())?;
