@@ -7,6 +7,8 @@ use super::{Metric, PrintedRow, PrintedTable, PrintedTables, Protocol, TableRow}
 
 /// The cell of a model that has no scores yet.
 const ABSENT: &str = "—";
+/// Least width of a cell on a terminal.
+const CELL: usize = 9;
 
 /// The tables of a protocol's metrics.
 pub(super) struct ProtocolTable<'a> {
@@ -216,8 +218,11 @@ impl<'a> ProtocolTable<'a> {
         let names = self.rows.iter().map(|row| row.name.clone());
         let widths = titles.chain(names).map(|name| name.chars().count());
         let width = widths.max().unwrap_or(0) + 1;
+        let longest = all.iter().map(|column| column.chars().count()).max();
+        let cell_width = longest.map_or(0, |longest| longest + 2).max(CELL);
         let line = |name: &str, cells: &[String]| {
-            let cells: String = cells.iter().map(|cell| format!("{cell:>9}")).collect();
+            let cells = cells.iter().map(|cell| format!("{cell:>cell_width$}"));
+            let cells: String = cells.collect();
             format!("{name:<width$}{cells}\n")
         };
         let header = |columns: &[String]| -> Vec<String> {
@@ -254,6 +259,11 @@ impl<'a> ProtocolTable<'a> {
             }
             out.push('\n');
         }
+        let is_counted = |column: &&String| {
+            let mut scores = measured.iter().map(|(_, scores)| scores);
+            *column == AVERAGE || scores.any(|scores| scores.windows_of(column).is_some())
+        };
+        let all: Vec<String> = all.iter().filter(is_counted).cloned().collect();
         if !same_columns {
             out += &line("", &header(&all));
         }
