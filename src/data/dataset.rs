@@ -27,7 +27,7 @@ use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
 use crate::motion::{Clip, FeatureError, Mapping, MappingError, ResampleError, resample};
 #[cfg(feature = "music")]
-use crate::music::{Analysis, Cache};
+use crate::music::{Analysis, Cache, FRAME_RATE};
 
 /// A recorded dance.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,6 +163,19 @@ impl Recording {
             music: None,
             #[cfg(feature = "music")]
             given_music: None,
+        }
+    }
+
+    /// When its music has beats, s from frame 0 on, ascending; none where nothing is known of it.
+    #[cfg(feature = "music")]
+    pub fn beat_times(&self) -> Vec<f64> {
+        match (&self.music, &self.given_music) {
+            (Some(music), _) => {
+                let beats = music.beats.iter();
+                beats.map(|&frame| frame as f64 / FRAME_RATE).collect()
+            }
+            (None, Some(given)) => given.beats.clone(),
+            (None, None) => Vec::new(),
         }
     }
 

@@ -63,7 +63,7 @@ pub struct Request {
     pub velocity_factors: Option<Array2<f64>>,
     /// Ground contacts wanted, 0 to 1, `[F, feet]`.
     pub contacts: Option<Array2<f64>>,
-    /// Features of the music, `[frames, numbers]`, frame 0 at frame 0 of the result.
+    /// Features of the music, `[F or more, numbers]`, frame 0 at frame 0 of the result.
     pub music: Option<Array2<f64>>,
     /// What every random number of the answer follows from.
     pub seed: u64,
@@ -102,6 +102,15 @@ pub enum NeededPoses {
     /// Two or more, the first at frame 0 and the last at the last frame, and so many frames before
     /// frame 0.
     Keyframes { past: usize },
+}
+
+/// How a model samples a dance, frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sampling {
+    /// That a likelihood is of.
+    pub predicted: usize,
+    /// Of music behind a frame that it hears: a request may give them behind its last.
+    pub look_ahead: usize,
 }
 
 /// What can be given beside poses.
@@ -176,6 +185,11 @@ pub trait Generator: Send + Sync {
         None
     }
 
+    /// How it samples a dance frame by frame; none of a model that does not.
+    fn sampling(&self) -> Option<Sampling> {
+        None
+    }
+
     /// [`Motion::raw`] of every request, without the rest.
     ///
     /// # Errors
@@ -194,6 +208,20 @@ pub trait Generator: Send + Sync {
     /// As [`Generator::generate`]; a model that has none.
     fn log_likelihoods(
         &self,
+        _requests: &[Request],
+        _truths: &[Motion],
+    ) -> Result<Vec<f64>, ModelError> {
+        Err(self.lacks("likelihood"))
+    }
+
+    /// The same where what the network knows is that of other requests, one for each: how much it
+    /// heeds what it knows.
+    ///
+    /// # Errors
+    /// As [`Generator::log_likelihoods`].
+    fn log_likelihoods_knowing(
+        &self,
+        _known: &[Request],
         _requests: &[Request],
         _truths: &[Motion],
     ) -> Result<Vec<f64>, ModelError> {
@@ -293,8 +321,9 @@ impl Request {
             ("music", &self.music),
         ] {
             let Some(array) = array else { continue };
-            let expected = [self.frames, array.ncols()];
-            check_shape(what, &expected, array.shape())?;
+            let longer = what == "music" && array.nrows() > self.frames;
+            let rows = if longer { array.nrows() } else { self.frames };
+            check_shape(what, &[rows, array.ncols()], array.shape())?;
             check_finite(what, array)?;
         }
         Ok(())
@@ -405,6 +434,19 @@ pub enum ModelError {
     NotFinite { what: String },
     #[error("{model}: {reason}")]
     Model { model: String, reason: String },
+    /// A sampled dance that left all that is danced; the others of its call are not made either.
+    #[error(
+        "{model}: the dance diverges: frame {frame} has {channel} at {deviations:.1} deviations; \
+         another seed may not, or generation.clamp bounds it"
+    )]
+    Diverged {
+        model: String,
+        /// Which request of the call.
+        request: usize,
+        frame: usize,
+        channel: String,
+        deviations: f64,
+    },
     /// Whoever asked does not want the answer any more.
     #[error("stopped")]
     Stopped,

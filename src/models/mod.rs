@@ -2,6 +2,7 @@
 //!
 //! - [`task`]: what training asks of a model;
 //! - [`generator`]: what a user, an evaluation or `generate` may ask of one;
+//! - [`inference`]: weights that answer;
 //! - [`exported_batch`]: a batch with a model's results, for comparison;
 //! - [`settings`]: what the commands ask of a kind of model;
 //! - [`registry`]: the list of kinds;
@@ -23,6 +24,7 @@ pub mod generator;
 pub mod gradient_report;
 #[cfg(feature = "papers")]
 pub mod harvey2020;
+pub mod inference;
 #[cfg(feature = "papers")]
 pub mod li2023;
 #[cfg(feature = "papers")]

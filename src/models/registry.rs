@@ -9,8 +9,10 @@ use super::{
     duan2022::Duan2022Kind,
     harvey2020::Harvey2020RotationsKind,
     li2023::Li2023Kind,
+    moglow2020::Moglow2020Kind,
     pu2022::Pu2022Kind,
     transition::Kind,
+    valleperez2021::Valleperez2021Kind,
 };
 
 /// Kinds that were [added](add) from outside.
@@ -31,6 +33,10 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(Harvey2020RotationsKind),
         #[cfg(feature = "papers")]
         Arc::new(Pu2022Kind),
+        #[cfg(feature = "papers")]
+        Arc::new(Valleperez2021Kind),
+        #[cfg(feature = "papers")]
+        Arc::new(Moglow2020Kind),
         #[cfg(feature = "papers")]
         Arc::new(Kind::Interpolation),
         #[cfg(feature = "papers")]

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::generator::Needs;
+use super::generator::{Needs, Sampling};
 use super::{Generator, ModelError, Motion, Request};
 use crate::motion::{ContactRule, Mapping};
 
@@ -11,7 +11,7 @@ pub struct Watched<'a> {
     pub model: &'a dyn Generator,
     /// Where it is true, answers are [`ModelError::Stopped`].
     pub stopped: &'a (dyn Fn() -> bool + Sync),
-    /// Is told the frames of each answer, by several threads at a time.
+    /// Is told the frames of each answer, one for each likelihood, by several threads at a time.
     pub answered: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -21,11 +21,20 @@ impl Watched<'_> {
         requests: &[Request],
         answer: impl FnOnce() -> Result<T, ModelError>,
     ) -> Result<T, ModelError> {
+        self.count(requests.iter().map(|it| it.frames as u64).sum(), answer)
+    }
+
+    /// An answer that counts as so many frames.
+    fn count<T>(
+        &self,
+        frames: u64,
+        answer: impl FnOnce() -> Result<T, ModelError>,
+    ) -> Result<T, ModelError> {
         if (self.stopped)() {
             return Err(ModelError::Stopped);
         }
         let answer = answer()?;
-        (self.answered)(requests.iter().map(|it| it.frames as u64).sum());
+        (self.answered)(frames);
         Ok(answer)
     }
 }
@@ -42,6 +51,10 @@ impl Generator for Watched<'_> {
     #[cfg(feature = "music")]
     fn music_features(&self) -> crate::music::FeatureSet {
         self.model.music_features()
+    }
+
+    fn sampling(&self) -> Option<Sampling> {
+        self.model.sampling()
     }
 
     fn reads_given_music(&self) -> bool {
@@ -74,6 +87,16 @@ impl Generator for Watched<'_> {
         truths: &[Motion],
     ) -> Result<Vec<f64>, ModelError> {
         let answer = || self.model.log_likelihoods(requests, truths);
-        self.watch(requests, answer)
+        self.count(requests.len() as u64, answer)
+    }
+
+    fn log_likelihoods_knowing(
+        &self,
+        known: &[Request],
+        requests: &[Request],
+        truths: &[Motion],
+    ) -> Result<Vec<f64>, ModelError> {
+        let ask = || self.model.log_likelihoods_knowing(known, requests, truths);
+        self.count(requests.len() as u64, ask)
     }
 }

@@ -9,6 +9,8 @@
 mod assembly;
 mod body;
 mod curve;
+#[cfg(feature = "music")]
+mod dataset;
 mod feet;
 mod figures;
 #[cfg(feature = "music")]
@@ -29,6 +31,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::motion::Clip;
+#[cfg(feature = "music")]
+pub use dataset::{by_name, dataset_with_music};
 #[cfg(feature = "music")]
 pub use files::{DanceFileError, write_clips};
 #[cfg(feature = "music")]

@@ -72,3 +72,77 @@ impl AugmentationConfig {
         )
     }
 }
+
+/// `[schedule]`
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ScheduleConfig {
+    pub steps: u64,
+    /// Windows of a step.
+    pub batch_size: usize,
+    /// Parts that a batch is computed in; 1 where norms need the whole batch.
+    pub shards: usize,
+    /// Only training clips whose names begin with one of these; left out: all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clips: Vec<String>,
+}
+
+/// `[generation]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GenerationConfig {
+    /// tau, deviation of the noise that dances are made from.
+    pub temperature: f64,
+    /// Bound of what is fed back, deviations; left out: none, and beyond 10 an error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clamp: Option<f64>,
+    /// Behind the end of the music its last frame is heard on.
+    pub pad_audio: bool,
+}
+
+impl Default for ScheduleConfig {
+    fn default() -> Self {
+        Self {
+            steps: 600_000,
+            batch_size: 336,
+            shards: 1,
+            clips: Vec::new(),
+        }
+    }
+}
+
+impl Default for GenerationConfig {
+    fn default() -> Self {
+        Self {
+            temperature: 1.0,
+            clamp: None,
+            pad_audio: true,
+        }
+    }
+}
+
+impl ScheduleConfig {
+    /// # Errors
+    /// A value outside its range.
+    pub fn check(&self) -> Result<(), ValueError> {
+        let within = |key: &str, value: usize, most: usize| {
+            let expected = format!("a whole number from 1 to {most}");
+            ValueError::unless((1..=most).contains(&value), key, value, expected)
+        };
+        ValueError::unless(self.steps > 0, "schedule.steps", 0, "at least 1")?;
+        within("schedule.batch_size", self.batch_size, 65_536)?;
+        within("schedule.shards", self.shards, self.batch_size)
+    }
+}
+
+impl GenerationConfig {
+    /// # Errors
+    /// A value outside its range.
+    pub fn check(&self) -> Result<(), ValueError> {
+        let (temperature, clamp) = (self.temperature, self.clamp.unwrap_or(1.0));
+        let usable = temperature.is_finite() && temperature >= 0.0;
+        ValueError::unless(usable, "generation.temperature", temperature, "0 or more")?;
+        let usable = clamp.is_finite() && clamp > 0.0;
+        ValueError::unless(usable, "generation.clamp", clamp, "more than 0")
+    }
+}

@@ -13,6 +13,7 @@ use crate::data::Recording;
 use crate::models::weights::{SavedWeights, WeightsError};
 use crate::models::{ModelError, Statistics};
 use crate::motion::{Clip, MotionColumns, NamedRotation};
+use crate::music::FeatureSet;
 
 const JOINTS: &str = "motion.joints";
 const TURNING: &str = "motion.turning";
@@ -52,14 +53,7 @@ impl DanceFeatures {
         mirror: bool,
     ) -> Result<Self, ModelError> {
         let clips: Vec<&Clip> = recordings.iter().map(|it| &it.clip).collect();
-        let columns = columns_of(&clips, config.centre_rotations, mirror)?;
-        let raw = clips.iter().map(|clip| measured(&columns, clip));
-        let mut raw = raw.collect::<Result<Vec<_>, _>>()?;
-        if mirror {
-            let images = raw.iter().map(|motion| mirrored(&columns, motion));
-            let images = images.collect::<Result<Vec<_>, _>>()?;
-            raw.extend(images);
-        }
+        let (columns, motion, _) = fit_motion(&clips, config.centre_rotations, mirror)?;
         let heard = recordings.iter().map(|it| heard(it, config.audio));
         let heard = heard.collect::<Result<Vec<_>, _>>()?;
         let audio = AudioColumns::fit(config.audio, recordings, &heard)?;
@@ -67,7 +61,7 @@ impl DanceFeatures {
         let music = music.collect::<Result<Vec<_>, _>>()?;
         let frame_time = clips.first().map_or(0.0, |clip| clip.frame_time);
         let features = Self {
-            motion: Scale::of(&raw, &floors(&columns)),
+            motion,
             audio_scale: Scale::of(&music, &vec![AUDIO_FLOOR; audio.width()]),
             columns,
             audio,
@@ -77,6 +71,16 @@ impl DanceFeatures {
             features.check_frame_time(&clip.name, clip.frame_time)?;
         }
         Ok(features)
+    }
+
+    /// What it hears of a sound.
+    pub fn music_features(&self) -> FeatureSet {
+        self.audio.audio().feature_set().unwrap_or_default()
+    }
+
+    /// Whether its music is what a data set gives.
+    pub fn reads_given_music(&self) -> bool {
+        self.audio.audio().feature_set().is_none()
     }
 
     /// Numbers of a frame: D, A.
@@ -186,6 +190,29 @@ impl DanceFeatures {
             frame_time,
         })
     }
+}
+
+/// The columns of training clips, and with `mirror` of their mirror images: which they are, their
+/// means and deviations, and they themselves, not standardised, `[frames, D]` each. `centre`: see
+/// [`columns_of`].
+///
+/// # Errors
+/// There is no clip, or none with a joint.
+pub fn fit_motion(
+    clips: &[&Clip],
+    centre: bool,
+    mirror: bool,
+) -> Result<(MotionColumns, Scale, Vec<Array2<f64>>), ModelError> {
+    let columns = columns_of(clips, centre, mirror)?;
+    let raw = clips.iter().map(|clip| measured(&columns, clip));
+    let mut raw = raw.collect::<Result<Vec<_>, _>>()?;
+    if mirror {
+        let images = raw.iter().map(|own| mirrored(&columns, own));
+        let images = images.collect::<Result<Vec<_>, _>>()?;
+        raw.extend(images);
+    }
+    let scale = Scale::of(&raw, &floors(&columns));
+    Ok((columns, scale, raw))
 }
 
 fn measured(columns: &MotionColumns, clip: &Clip) -> Result<Array2<f64>, ModelError> {

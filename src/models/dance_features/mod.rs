@@ -7,22 +7,30 @@
 //! - [`scale`]: means and deviations;
 //! - [`features`]: all of it, fitted to the training part, saved and read back;
 //! - [`pieces`]: the parts of a data set in these numbers;
-//! - [`windows`]: at which frames there is a window;
-//! - [`given`]: from a request to these numbers, and back to a dance.
+//! - [`windows`]: at which frames there is a window, [`epochs`]: in which order they are trained;
+//! - [`given`]: from a request to these numbers, and back to a dance; [`sampled`]: a dance that
+//!   grows;
+//! - [`made_up`]: generated dances, for timings.
 
 pub mod config;
+pub mod epochs;
 pub mod features;
 pub mod given;
 pub mod joints;
+pub mod made_up;
 pub mod music;
 pub mod pieces;
+pub mod sampled;
 pub mod scale;
 pub mod windows;
 
-pub use config::{Audio, AugmentationConfig, FeaturesConfig};
-pub use features::DanceFeatures;
+pub use config::{Audio, AugmentationConfig, FeaturesConfig, GenerationConfig, ScheduleConfig};
+pub use epochs::{Epochs, PieceWindow};
+pub use features::{DanceFeatures, fit_motion};
 pub use given::GivenDance;
+pub use made_up::{Endless, MadeUp, made_up};
 pub use music::{AudioColumns, heard, heard_by};
-pub use pieces::{DanceData, Piece};
+pub use pieces::{DanceData, Piece, with_noise};
+pub use sampled::SampledFrames;
 pub use scale::Scale;
 pub use windows::Contexts;

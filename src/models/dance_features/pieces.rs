@@ -1,6 +1,8 @@
 //! The parts of a data set in the numbers of a model.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
+use rand::Rng;
+use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
 
 use super::config::FeaturesConfig;
@@ -54,6 +56,18 @@ impl DanceData {
         mirror: bool,
     ) -> Result<Self, ModelError> {
         let features = DanceFeatures::fit(&dataset.train, config, mirror)?;
+        Self::in_numbers(features, dataset, mirror)
+    }
+
+    /// The same in numbers that are known, such as those of weights that a training starts from.
+    ///
+    /// # Errors
+    /// As [`DanceFeatures::piece`].
+    pub fn in_numbers(
+        features: DanceFeatures,
+        dataset: &Dataset,
+        mirror: bool,
+    ) -> Result<Self, ModelError> {
         let part = |recordings: &[Recording]| {
             let pieces: Vec<_> = recordings.par_iter().map(|it| features.piece(it)).collect();
             pieces.into_iter().collect::<Result<Vec<_>, _>>()
@@ -72,6 +86,42 @@ impl DanceData {
             warnings,
         })
     }
+}
+
+impl DanceData {
+    /// Keeps the training pieces whose names begin with one of `clips`; all where none is named.
+    ///
+    /// # Errors
+    /// One of them begins no name.
+    pub fn keep(&mut self, clips: &[String]) -> Result<(), ModelError> {
+        for clip in clips {
+            if !self
+                .train
+                .iter()
+                .any(|piece| piece.name.starts_with(&**clip))
+            {
+                return Err(ModelError::Data {
+                    reason: format!("schedule.clips: no training clip's name begins with {clip}"),
+                });
+            }
+        }
+        let named = |piece: &Piece| clips.iter().any(|clip| piece.name.starts_with(&**clip));
+        self.train.retain(|piece| clips.is_empty() || named(piece));
+        Ok(())
+    }
+}
+
+/// Motion with Gaussian noise of a deviation in those of its columns (`target_noise`; spec,
+/// section 2).
+pub fn with_noise(motion: ArrayView2<'_, f32>, deviation: f64, rng: &mut impl Rng) -> Array2<f32> {
+    let mut motion = motion.to_owned();
+    if deviation > 0.0 {
+        motion.mapv_inplace(|x| {
+            let draw: f64 = StandardNormal.sample(rng);
+            x + (deviation * draw) as f32
+        });
+    }
+    motion
 }
 
 /// A warning about rotations whose numbers jump.

@@ -7,4 +7,4 @@ mod prior;
 
 pub use linear::PluLinear;
 pub use norm::{FlowNorm, NormKind, Normed};
-pub use prior::{LN_TAU, noise_like, squares_of_windows};
+pub use prior::{Density, LN_TAU, noise_like, squares_of_windows};

@@ -1,10 +1,12 @@
-//! The standard normal density that a flow ends in.
+//! The standard normal density that a flow ends in, and the likelihood that follows from it (spec of
+//! Valle-Pérez et al., section 6).
 
 use ndarray::Array2;
 use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use crate::autograd::Real;
+use crate::autograd::{AutogradError, Real, Tape, Var};
+use crate::models::LossTerms;
 
 /// ln 2 pi.
 pub const LN_TAU: f64 = 1.837_877_066_409_345_3;
@@ -28,4 +30,50 @@ pub fn noise_like(
         let draw: f64 = StandardNormal.sample(rng);
         temperature * draw
     })
+}
+
+/// What a flow makes of rows of D channels, as far as its likelihood follows from it.
+pub struct Density<'f> {
+    /// z, `[rows, D]`.
+    pub z: Var,
+    /// ln |det| of all norms for one row, `[1]`.
+    pub norms: Var,
+    /// Of all linear layers for one row, `[1]`.
+    pub linears: Var,
+    /// Scales of the couplings: their logarithms add up to the couplings' ln |det|.
+    pub scales: &'f [Var],
+}
+
+impl Density<'_> {
+    /// -log p of all rows times `unit`, as `prior`, `norm`, `linear` and `coupling`.
+    ///
+    /// # Errors
+    /// z is no matrix.
+    pub fn loss<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        unit: f64,
+    ) -> Result<LossTerms, AutogradError> {
+        let numbers = tape.values(self.z).len() as f64;
+        let rows = tape.shape(self.z).first().copied().unwrap_or(0) as f64;
+        let squares = tape.square(self.z);
+        let squares = tape.sum(squares);
+        let prior = tape.affine(squares, unit / 2.0, LN_TAU / 2.0 * numbers * unit);
+        let norms = tape.affine(self.norms, -rows * unit, 0.0);
+        let linears = tape.affine(self.linears, -rows * unit, 0.0);
+        let mut couplings = tape.constant_with(&[1], |out| out.fill(T::zero()));
+        for &scale in self.scales {
+            let logs = tape.ln(scale);
+            let sum = tape.sum(logs);
+            let nats = tape.affine(sum, -unit, 0.0);
+            couplings = tape.add(couplings, nats)?;
+        }
+        let terms = [
+            ("prior", 1.0, prior),
+            ("norm", 1.0, norms),
+            ("linear", 1.0, linears),
+            ("coupling", 1.0, couplings),
+        ];
+        LossTerms::weighted(tape, &terms, None)
+    }
 }

@@ -3,6 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::models::dance_features::{
+    AugmentationConfig, Contexts, FeaturesConfig, GenerationConfig, ScheduleConfig,
+};
 use crate::models::settings::ValueError;
 
 /// All tables.
@@ -10,6 +13,10 @@ use crate::models::settings::ValueError;
 #[serde(default, deny_unknown_fields)]
 pub struct MoglowSettings {
     pub model: MoglowConfig,
+    pub features: FeaturesConfig,
+    pub schedule: ScheduleConfig,
+    pub augmentation: AugmentationConfig,
+    pub generation: GenerationConfig,
 }
 
 /// `[model]`
@@ -59,6 +66,16 @@ impl MoglowConfig {
     pub fn condition(&self, motion: usize, audio: usize) -> usize {
         motion * self.motion_past + audio * (self.audio_past + self.audio_future)
     }
+
+    /// What a sequence of frames reads and predicts, as one window.
+    pub fn sequence_contexts(&self) -> Contexts {
+        Contexts {
+            motion: self.motion_past,
+            audio_past: self.audio_past,
+            audio_future: self.sequence - 1 + self.audio_future,
+            predicted: self.sequence,
+        }
+    }
 }
 
 impl MoglowSettings {
@@ -76,12 +93,15 @@ impl MoglowSettings {
         within("model.motion_past", model.motion_past, 1, 1000)?;
         let context = model.motion_context;
         within("model.motion_context", context, model.motion_past, 10_000)?;
-        // The seed is all that is known before the first frame.
-        within("model.audio_past", model.audio_past, 0, context)?;
+        // A sequence begins where its first frame has all that it knows.
+        within("model.audio_past", model.audio_past, 0, model.motion_past)?;
         within("model.audio_future", model.audio_future, 1, 1000)?;
         within("model.sequence", model.sequence, 1, 10_000)?;
         let share = (0.0..1.0).contains(&model.pose_dropout);
         let dropout = model.pose_dropout;
-        ValueError::unless(share, "model.pose_dropout", dropout, "0 to below 1")
+        ValueError::unless(share, "model.pose_dropout", dropout, "0 to below 1")?;
+        self.schedule.check()?;
+        self.augmentation.check()?;
+        self.generation.check()
     }
 }

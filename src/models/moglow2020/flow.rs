@@ -10,7 +10,7 @@ use super::config::MoglowConfig;
 use super::coupling::LstmCoupling;
 use crate::autograd::{AutogradError, Parameters, Real, Tape, Var, Workspace};
 use crate::models::LossTerms;
-use crate::models::flow::{FlowNorm, LN_TAU, NormKind, PluLinear};
+use crate::models::flow::{Density, FlowNorm, LN_TAU, NormKind, PluLinear};
 use crate::nn::Initialiser;
 
 /// MoGlow.
@@ -165,29 +165,14 @@ impl Moglow2020 {
         batch: &SequenceBatch<T>,
     ) -> Result<LossTerms, AutogradError> {
         let output = self.forward(tape, batch)?;
-        let rows = batch.target.nrows() as f64;
-        let frames = rows / batch.sequences.max(1) as f64;
-        let unit = 1.0 / (batch.total_sequences as f64 * frames * LN_2);
-        let squares = tape.square(output.z);
-        let squares = tape.sum(squares);
-        let normal = LN_TAU / 2.0 * rows * self.channels as f64 * unit;
-        let prior = tape.affine(squares, unit / 2.0, normal);
-        let norms = tape.affine(output.norms, -rows * unit, 0.0);
-        let linears = tape.affine(output.linears, -rows * unit, 0.0);
-        let mut couplings = tape.constant_with(&[1], |out| out.fill(T::zero()));
-        for scale in output.scales {
-            let logs = tape.ln(scale);
-            let sum = tape.sum(logs);
-            let bits = tape.affine(sum, -unit, 0.0);
-            couplings = tape.add(couplings, bits)?;
-        }
-        let terms = [
-            ("prior", 1.0, prior),
-            ("norm", 1.0, norms),
-            ("linear", 1.0, linears),
-            ("coupling", 1.0, couplings),
-        ];
-        LossTerms::weighted(tape, &terms, None)
+        let frames = batch.target.nrows() as f64 / batch.sequences.max(1) as f64;
+        let density = Density {
+            z: output.z,
+            norms: output.norms,
+            linears: output.linears,
+            scales: &output.scales,
+        };
+        density.loss(tape, 1.0 / (batch.total_sequences as f64 * frames * LN_2))
     }
 
     /// log p of the last `counted` frames of every sequence in nats, and the states behind them.

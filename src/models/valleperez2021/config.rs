@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::models::dance_features::{
+    AugmentationConfig, Contexts, FeaturesConfig, GenerationConfig, ScheduleConfig,
+};
 use crate::models::flow::NormKind;
 use crate::models::settings::ValueError;
 use crate::nn::Positions;
@@ -11,6 +14,7 @@ use crate::nn::Positions;
 #[serde(default, deny_unknown_fields)]
 pub struct ValleperezSettings {
     pub model: ValleperezConfig,
+    pub features: FeaturesConfig,
     pub schedule: ScheduleConfig,
     pub augmentation: AugmentationConfig,
     pub generation: GenerationConfig,
@@ -41,6 +45,8 @@ pub struct ValleperezConfig {
     pub audio_future: usize,
     /// N, frames that are predicted together.
     pub predicted_frames: usize,
+    /// Whether it hears: without, the numbers of the music are 0.
+    pub music: bool,
     pub positions: Positions,
     pub cross_positions: CrossPositions,
     /// K.
@@ -99,42 +105,6 @@ pub enum LinearInit {
     Whitening,
 }
 
-/// `[schedule]`
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ScheduleConfig {
-    pub steps: u64,
-    /// Windows of a step.
-    pub batch_size: usize,
-    /// Parts that a batch is computed in; 1 where norms need the whole batch.
-    pub shards: usize,
-}
-
-/// `[augmentation]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AugmentationConfig {
-    /// Mirror images are trained, too.
-    pub mirror: bool,
-    /// Exponential maps are taken from the training part's mean rotations.
-    pub centre_rotations: bool,
-    /// Deviation of the noise on training targets and motion context, deviations of the data.
-    pub target_noise: f64,
-}
-
-/// `[generation]`
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GenerationConfig {
-    /// tau, deviation of the noise that dances are made from.
-    pub temperature: f64,
-    /// Bound of what is fed back, deviations; none: unbounded, and beyond 10 an error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub clamp: Option<f64>,
-    /// Behind the end of the music its last frame is heard on.
-    pub pad_audio: bool,
-}
-
 impl Default for ValleperezConfig {
     fn default() -> Self {
         Self {
@@ -150,6 +120,7 @@ impl Default for ValleperezConfig {
             audio_past: 120,
             audio_future: 20,
             predicted_frames: 3,
+            music: true,
             positions: Positions::T5,
             cross_positions: CrossPositions::Index,
             blocks: 16,
@@ -165,40 +136,20 @@ impl Default for ValleperezConfig {
     }
 }
 
-impl Default for ScheduleConfig {
-    fn default() -> Self {
-        Self {
-            steps: 600_000,
-            batch_size: 336,
-            shards: 1,
-        }
-    }
-}
-
-impl Default for AugmentationConfig {
-    fn default() -> Self {
-        Self {
-            mirror: true,
-            centre_rotations: false,
-            target_noise: 0.0,
-        }
-    }
-}
-
-impl Default for GenerationConfig {
-    fn default() -> Self {
-        Self {
-            temperature: 1.0,
-            clamp: None,
-            pad_audio: true,
-        }
-    }
-}
-
 impl ValleperezConfig {
     /// Frames of music that a window hears.
     pub fn audio_frames(&self) -> usize {
         self.audio_past + self.audio_future
+    }
+
+    /// What a window reads and predicts.
+    pub fn contexts(&self) -> Contexts {
+        Contexts {
+            motion: self.motion_context,
+            audio_past: self.audio_past,
+            audio_future: self.audio_future,
+            predicted: self.predicted_frames,
+        }
     }
 }
 
@@ -243,24 +194,12 @@ impl ValleperezSettings {
         let own = model.head == Head::Flow || model.target == TargetKind::Pose;
         let expected = "\"pose\" where model.head is \"deterministic\"";
         ValueError::unless(own, "model.target", "another", expected)?;
-        let schedule = &self.schedule;
-        ValueError::unless(schedule.steps > 0, "schedule.steps", 0, "at least 1")?;
-        within("schedule.batch_size", schedule.batch_size, 1, 65_536)?;
-        within("schedule.shards", schedule.shards, 1, schedule.batch_size)?;
         let whole = model.head == Head::Deterministic || model.norm == NormKind::Act;
         let expected = "1 where model.norm is \"batch\": its statistics are those of a whole batch";
-        let shards = schedule.shards;
+        let shards = self.schedule.shards;
         ValueError::unless(whole || shards == 1, "schedule.shards", shards, expected)?;
-        let noise = self.augmentation.target_noise;
-        let usable = noise.is_finite() && noise >= 0.0;
-        ValueError::unless(usable, "augmentation.target_noise", noise, "0 or more")?;
-        let GenerationConfig {
-            temperature, clamp, ..
-        } = self.generation;
-        let usable = temperature.is_finite() && temperature >= 0.0;
-        ValueError::unless(usable, "generation.temperature", temperature, "0 or more")?;
-        let clamp = clamp.unwrap_or(1.0);
-        let usable = clamp.is_finite() && clamp > 0.0;
-        ValueError::unless(usable, "generation.clamp", clamp, "more than 0")
+        self.schedule.check()?;
+        self.augmentation.check()?;
+        self.generation.check()
     }
 }

@@ -10,7 +10,7 @@ use super::encoder::CrossModalEncoder;
 use super::flow::{Flow, FlowOutput};
 use crate::autograd::{AutogradError, Parameters, Real, Tape, Var, Workspace};
 use crate::models::LossTerms;
-use crate::models::flow::{LN_TAU, squares_of_windows};
+use crate::models::flow::{Density, LN_TAU, squares_of_windows};
 use crate::nn::Initialiser;
 
 /// The network of Valle-Pérez et al. 2021, or its deterministic baseline.
@@ -19,6 +19,7 @@ pub struct Valleperez2021 {
     encoder: CrossModalEncoder,
     /// None of the deterministic baseline.
     flow: Option<Flow>,
+    hears: bool,
     frames: usize,
     channels: usize,
 }
@@ -56,6 +57,7 @@ impl Valleperez2021 {
                 Head::Flow => Some(Flow::new(init, config, motion, config.width, first)?),
                 Head::Deterministic => None,
             },
+            hears: config.music,
             frames: config.predicted_frames,
             channels: motion,
         })
@@ -72,7 +74,13 @@ impl Valleperez2021 {
         batch: &WindowBatch<T>,
     ) -> Result<Var, AutogradError> {
         let motion = tape.constant(batch.motion.clone());
-        let audio = tape.constant(batch.audio.clone());
+        let audio = match self.hears {
+            true => tape.constant(batch.audio.clone()),
+            false => {
+                let shape = batch.audio.shape().to_vec();
+                tape.constant_with(&shape, |out| out.fill(T::zero()))
+            }
+        };
         self.encoder.forward(tape, motion, audio)
     }
 
@@ -89,6 +97,11 @@ impl Valleperez2021 {
     ) -> Result<FlowOutput, AutogradError> {
         let x = tape.constant(batch.target.clone());
         self.flow()?.forward(tape, x, h, training)
+    }
+
+    /// Whether it samples; else it is the deterministic baseline.
+    pub fn is_flow(&self) -> bool {
+        self.flow.is_some()
     }
 
     fn flow(&self) -> Result<&Flow, AutogradError> {
@@ -124,7 +137,8 @@ impl Valleperez2021 {
     }
 
     /// -log p of a frame in bits (spec, section 6), and its parts; of the deterministic baseline
-    /// the mean squared error (section 8). A part of a step's.
+    /// the mean squared error (section 8). A part of a step's. In a `training` running statistics
+    /// take up the batch first.
     ///
     /// # Errors
     /// A batch of other sizes.
@@ -132,6 +146,7 @@ impl Valleperez2021 {
         &self,
         tape: &mut Tape<'_, T>,
         batch: &WindowBatch<T>,
+        training: bool,
     ) -> Result<LossTerms, AutogradError> {
         let h = self.latent(tape, batch)?;
         if self.flow.is_none() {
@@ -143,30 +158,16 @@ impl Valleperez2021 {
             let mean = tape.affine(sum, 1.0 / numbers as f64, 0.0);
             return LossTerms::weighted(tape, &[("squared_error", 1.0, mean)], None);
         }
-        let output = self.noise(tape, batch, h, true)?;
-        // Bits a frame of a sum over the windows of this part.
+        let output = self.noise(tape, batch, h, training)?;
+        // Bits a frame of the step, of a sum over the windows of this part.
         let unit = 1.0 / ((batch.total_windows * self.frames) as f64 * LN_2);
-        let frames = (batch.windows * self.frames) as f64;
-        let squares = tape.square(output.z);
-        let squares = tape.sum(squares);
-        let normal = LN_TAU / 2.0 * frames * self.channels as f64 * unit;
-        let prior = tape.affine(squares, unit / 2.0, normal);
-        let norms = tape.affine(output.norms, -frames * unit, 0.0);
-        let linears = tape.affine(output.linears, -frames * unit, 0.0);
-        let mut couplings = tape.constant_with(&[1], |out| out.fill(T::zero()));
-        for scale in output.scales {
-            let logs = tape.ln(scale);
-            let sum = tape.sum(logs);
-            let bits = tape.affine(sum, -unit, 0.0);
-            couplings = tape.add(couplings, bits)?;
-        }
-        let terms = [
-            ("prior", 1.0, prior),
-            ("norm", 1.0, norms),
-            ("linear", 1.0, linears),
-            ("coupling", 1.0, couplings),
-        ];
-        let mut losses = LossTerms::weighted(tape, &terms, None)?;
+        let density = Density {
+            z: output.z,
+            norms: output.norms,
+            linears: output.linears,
+            scales: &output.scales,
+        };
+        let mut losses = density.loss(tape, unit)?;
         losses.buffers = output.buffers;
         Ok(losses)
     }
