@@ -14,17 +14,19 @@ use crate::report::figures::{FigureRequest, drawing_of};
 use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
 /// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al., 4
-/// to 9 of Pu and Shan
+/// to 9 of Pu and Shan, 3 of Valle-Pérez et al.
 ///
-/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
-/// test clip: by default the one in the middle of the first clip by name. Captions and CSV files
-/// give means over such a transition of every test clip that is long enough. A model of Pan et al.
-/// follows a control where it gives at least a third of the change that is asked for; the captions
-/// of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al. need the rows
-/// mix_embedding and slerp, position_loss and contact_loss beside the model. Figures 5 and 6 of Pu
-/// and Shan are over evaluated rows, figure 7 is of the model's own scores; figures 8 and 9 show the
-/// beginning of the first test clip by name. Motion is shown as the model predicts it, neither bent
-/// onto the keyframes nor cleaned up.
+/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition
+/// of a test clip: by default the one in the middle of the first clip by name. Captions and CSV
+/// files give means over such a transition of every test clip that is long enough. A model of
+/// Pan et al. follows a control where it gives at least a third of the change that is asked
+/// for; the captions of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al.
+/// need the rows mix_embedding and slerp, position_loss and contact_loss beside the model.
+/// Figures 5 and 6 of Pu and Shan are over evaluated rows, figure 7 is of the model's own
+/// scores; figures 8 and 9 show the beginning of the first test clip by name. Figure 3 of
+/// Valle-Pérez et al. shows the tempi of a test clip's song and of dances to it by the model
+/// and those of --compare. Motion is shown as the model predicts it, neither bent onto the
+/// keyframes nor cleaned up.
 #[derive(Debug, Args)]
 pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training

@@ -28,8 +28,8 @@ pub trait Protocol: Send + Sync {
         "N"
     }
 
-    /// Frames of all requests that a model will be asked on recordings of these numbers of frames:
-    /// how far an evaluation has to go.
+    /// Frames of all requests that a model will be asked on recordings of these numbers of frames,
+    /// one for each likelihood: how far an evaluation has to go.
     fn frames(&self, recordings: &[usize]) -> u64;
 
     /// Scores a model on a part of the data. The scores are the same to the bit on any number of

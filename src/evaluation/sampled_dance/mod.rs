@@ -9,18 +9,27 @@
 //! - [`prompting`]: what a seed's style does (table 4);
 //! - [`freezing`], [`divergence`], [`diversity`], [`step`]: how dances go wrong.
 
+mod asked;
 pub mod beat_alignment;
+mod dances;
 pub mod divergence;
 pub mod diversity;
 pub mod frechet;
 pub mod freezing;
 pub mod kinematic_beats;
+mod likelihood;
 mod metrics;
+mod paper;
 pub mod prompting;
+mod protocol;
 pub mod step;
 pub mod tempogram;
 
+pub use asked::dance_question;
+pub use likelihood::Likelihood;
 pub use metrics::METRICS;
+pub use paper::VALLEPEREZ2021;
+pub use protocol::SampledDance;
 
 /// The column of the root's height, cm.
 pub const HEIGHT: usize = 2;
