@@ -83,6 +83,18 @@ pub struct GenerateArgs {
 }
 
 impl GenerateArgs {
+    /// Where the dances go: --out, numbered where there are several.
+    fn files(&self) -> Vec<PathBuf> {
+        let [stem, ending] = [self.out.file_stem(), self.out.extension()]
+            .map(|part| part.unwrap_or_default().to_string_lossy());
+        match self.song.count {
+            1 => vec![self.out.clone()],
+            count => (1..=count)
+                .map(|number| self.out.with_file_name(format!("{stem}_{number}.{ending}")))
+                .collect(),
+        }
+    }
+
     /// What they ask of a model for data of so many frames a second.
     fn request(&self, fps: f64) -> DanceRequest {
         let name = self.out.file_name().unwrap_or_default();
@@ -114,27 +126,42 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
     let (mut inputs, own) = (request.files(), subject.files());
     inputs.extend(&own);
     inputs.extend(&args.data);
-    let outputs = args.viewer.iter().chain(&args.json).chain([&args.out]);
+    let files = args.files();
+    let outputs = args.viewer.iter().chain(&args.json).chain(&files);
     check_outputs(outputs, inputs.iter().copied(), args.force)?;
-    subject.check_no_clip(&args.out)?;
+    for file in &files {
+        subject.check_no_clip(file)?;
+    }
     warn(beside_clips(&args.out, &inputs));
     if let Some(folder) = &args.data {
         let dataset = Dataset::load(folder, &subject.config.data)?;
         warn(&dataset.warnings);
         subject.model.look_up_in(&dataset.train)?;
     }
-    let dance = Dance::make(&subject, &request, &data, &mut |notice| warn([notice]))?;
+    let mut dances = Vec::new();
+    for number in 0..args.song.count {
+        let mut request = request.clone();
+        request.seed = request.seed.wrapping_add(number);
+        let mut tell = |notice| warn((number == 0).then_some(notice));
+        dances.push(Dance::make(&subject, &request, &data, &mut tell)?);
+    }
     let page = args.viewer.as_ref();
-    let page = page.map(|path| dance_page(&subject, &dance, &data, args.song.sound(path)));
+    let page = page.map(|path| dance_page(&subject, &dances, &data, args.song.sound(path)));
     let page = page.transpose()?;
-    bvh::write(&args.out, &dance.document)?;
+    for (file, dance) in files.iter().zip(&dances) {
+        bvh::write(file, &dance.document)?;
+    }
     if let Some((path, page)) = args.viewer.as_ref().zip(page) {
         replace_file(path, page)?;
     }
-    let summary = &dance.summary;
     if let Some(path) = &args.json {
-        write_json(path, summary)?;
+        match &dances[..] {
+            [one] => write_json(path, &one.summary)?,
+            all => write_json(path, &all.iter().map(|it| &it.summary).collect::<Vec<_>>())?,
+        }
     }
-    writeln!(std::io::stdout(), "{summary}{}", args.out.display())?;
+    for (file, dance) in files.iter().zip(&dances) {
+        writeln!(std::io::stdout(), "{}{}", dance.summary, file.display())?;
+    }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use glam::DVec3;
 use serde::Serialize;
@@ -103,15 +104,15 @@ pub enum SongError {
     #[error("{model} does not dance to music from a seed; give --keyframe or --motion alone")]
     Deaf { model: String },
     #[error(
-        "the model's data has {fps} frames a second and music is heard at {heard}; such a model \
+        "the model's data has {fps} frames a second and its music is heard at {heard}; such a model \
          cannot dance to a song"
     )]
     Rate { fps: f64, heard: f64 },
     #[error(
-        "{model} reads the numbers that its data set gives of the music, which no song has; train a \
-         model of what is heard"
+        "{model} was trained with numbers of music that its data set gives; of a song they are not \
+         known"
     )]
-    Numbers { model: String },
+    GivenMusic { model: String },
     #[error(
         "a dance of {} to {song} is shorter than the seed, {}: give a longer song, or a later end",
         counted(*frames, "frame"),
@@ -168,9 +169,7 @@ pub struct Song {
     /// What the model is asked.
     pub request: Request,
     pub music: Analysis,
-    /// Frames a second of the dance.
-    pub fps: f64,
-    /// The song's file.
+    /// Its file.
     pub file: PathBuf,
     /// T', frames of the seed.
     pub seed: usize,
@@ -199,28 +198,25 @@ impl Song {
         };
         if model.reads_given_music() {
             let model = model.name().into();
-            return Err(SongError::Numbers { model });
+            return Err(SongError::GivenMusic { model });
         }
-        let set = model.music_features();
-        if data.fps != set.frame_rate() {
-            return Err(SongError::Rate {
-                fps: data.fps,
-                heard: set.frame_rate(),
-            });
+        let heard = model.music_features().frame_rate();
+        if data.fps != heard {
+            let fps = data.fps;
+            return Err(SongError::Rate { fps, heard });
         }
         let heard = cache.analysis(&choice.music)?;
         let named = |notice| format!("{}: {notice}", choice.music.display());
         let mut notices: Vec<String> = heard.warnings.into_iter().map(named).collect();
         let music = heard.analysis;
-        let features = music.features(set);
-        let end = features.nrows();
-        let frames = end.min(choice.frames.unwrap_or(usize::MAX));
+        let heard = music.features(model.music_features());
+        let frames = heard.nrows().min(choice.frames.unwrap_or(usize::MAX));
         let song = || choice.music.clone();
         if !music.has_onsets() {
             notices.push(format!("no beat is heard in {}", choice.music.display()));
         }
-        if let Some(wanted) = choice.frames.filter(|wanted| *wanted > end) {
-            let song = choice.music.display();
+        if let Some(wanted) = choice.frames.filter(|wanted| *wanted > heard.nrows()) {
+            let (song, end) = (choice.music.display(), heard.nrows());
             notices.push(format!("{song} ends at frame {end}, before frame {wanted}"));
         }
         if frames <= needed {
@@ -269,7 +265,7 @@ impl Song {
             pose,
             features: None,
         });
-        let heard = features.slice(ndarray::s![..frames, ..]).mapv(f64::from);
+        let heard = heard.mapv(f64::from);
         let request = Request {
             given: given.collect(),
             music: Some(heard),
@@ -278,7 +274,6 @@ impl Song {
         Ok(Self {
             request,
             music,
-            fps: files.data.fps,
             file: choice.music.clone(),
             seed: needed,
             held,
@@ -301,7 +296,9 @@ impl Song {
         model: &dyn Generator,
         name: &str,
     ) -> Result<(Clip, SongSummary), SongError> {
+        let start = Instant::now();
         let motions = model.generate(std::slice::from_ref(&self.request))?;
+        let taken = start.elapsed().as_secs_f64();
         let no_rotations = || SongError::NoRotations {
             model: model.name().into(),
         };
@@ -314,7 +311,9 @@ impl Song {
             frame_time: self.request.frame_time,
             poses: poses.ok_or_else(no_rotations)?,
         };
-        let summary = self.summary(model.name(), &clip);
+        let mut summary = self.summary(model.name(), &clip);
+        let made = clip.poses.len().saturating_sub(self.seed) as f64;
+        summary.frames_a_second = made / taken.max(1e-9);
         Ok((clip, summary))
     }
 
@@ -343,19 +342,20 @@ impl Song {
             let distances = own.iter().zip(&wanted).map(|(a, b)| a.distance(*b));
             KeyPoseMiss {
                 frame,
-                seconds: frame as f64 / self.fps,
+                seconds: frame as f64 * clip.frame_time,
                 distance: distances.sum::<f64>() / own.len() as f64,
             }
         });
         SongSummary {
             model: model.into(),
             frames: clip.poses.len(),
-            seconds: clip.poses.len() as f64 / self.fps,
+            seconds: clip.poses.len() as f64 * clip.frame_time,
             tempo: self.music.tempo,
             metre: self.music.metre,
             seed_frames: self.seed,
             seed_is_held: self.held,
             key_poses: key_poses.collect(),
+            frames_a_second: 0.0,
             units: Units::from([
                 ("seconds", "s"),
                 ("tempo", "beats/min"),
@@ -436,9 +436,9 @@ impl Files {
             let FileKeyframe { file, frame, time } = key;
             format!("{}:{frame}@{time}", file.display())
         };
-        let fps = self.data.fps;
         let mut asked: Vec<&FileKeyframe> = asked.iter().collect();
         asked.sort_by_key(|key| key.time);
+        let fps = self.data.fps;
         if let Some(pair) = asked.windows(2).find(|pair| pair[0].time == pair[1].time) {
             return Err(SongError::Twice {
                 frame: pair[0].time,
@@ -481,6 +481,9 @@ pub struct SongSummary {
     seed_frames: usize,
     seed_is_held: bool,
     key_poses: Vec<KeyPoseMiss>,
+    /// Frames that were made in a second of the clock: another each time, so no JSON holds it.
+    #[serde(skip)]
+    frames_a_second: f64,
     units: Units,
 }
 
@@ -523,6 +526,7 @@ impl fmt::Display for SongSummary {
             true => writeln!(f, "seed: one pose held for {seed}")?,
             false => writeln!(f, "seed: {seed}")?,
         }
+        writeln!(f, "made: {:.0} frames a second", self.frames_a_second)?;
         for KeyPoseMiss {
             frame,
             seconds,

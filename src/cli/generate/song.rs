@@ -29,6 +29,10 @@ pub struct SongArgs {
     /// may not be yours to pass on
     #[arg(long, requires = "viewer")]
     embed_music: bool,
+    /// So many dances, each drawn anew: --seed is that of the first. Files are numbered, such as
+    /// OUT_1.bvh; the page shows all
+    #[arg(long, value_name = "N", requires = "music", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub count: u64,
     /// End of the dance, where it is shorter than the song: frames, or seconds such as 30s
     #[arg(
         long,

@@ -9,7 +9,7 @@ use crate::models::ModelKind as _;
 use crate::models::baselines::interpolation::Interpolation;
 use crate::models::transition::Kind;
 use crate::motion::placement::world_positions;
-use crate::motion::{Foot, Pose};
+use crate::motion::{Clip, Foot, Pose};
 use crate::report::{FigureError, ReportError};
 use crate::run::Subject;
 use crate::synthesis::{Completion, Dance, MadeSequence, Origin, SequenceRequest, synthesise};
@@ -36,21 +36,32 @@ impl Viewer {
     }
 }
 
-/// The page of a dance, HTML.
+/// The page of a dance, HTML; of several to one song, all of them.
 ///
 /// # Errors
 /// Interpolation cannot be asked, the song cannot be named, or the page has nothing to show.
 pub fn dance_page(
     subject: &Subject,
-    dance: &Dance,
+    dances: &[Dance],
     data: &DataConfig,
     sound: Sound<'_>,
 ) -> Result<String, ReportError> {
     let name = &subject.config.name;
-    match &dance.origin {
+    let nothing = || ReportError::Refused("there is no dance to show".into());
+    match &dances.first().ok_or_else(nothing)?.origin {
         Origin::Sequence(made) => generated_page(subject, made),
         Origin::Completion { keyframes, made } => Ok(completed_page(name, keyframes, made)?),
-        Origin::Song { song, dance } => song_page(name, song, dance, data, sound),
+        Origin::Song { song, .. } => {
+            let to_song = |dance| match dance {
+                &Dance {
+                    origin: Origin::Song { ref dance, .. },
+                    ..
+                } => Some(dance),
+                _ => None,
+            };
+            let all: Vec<&Clip> = dances.iter().filter_map(to_song).collect();
+            song_page(name, song, &all, data, sound)
+        }
     }
 }
 

@@ -8,7 +8,6 @@ use url::Url;
 
 use super::{MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion, ViewerMusic};
 use crate::data::DataConfig;
-use crate::models::ModelError;
 use crate::models::transition::DanceClip;
 use crate::motion::Clip;
 use crate::music::FRAME_RATE;
@@ -45,9 +44,12 @@ impl ViewerMusic {
     /// Its file cannot be read, or has no address that the page could name.
     fn of(song: &Song, frames: usize, sound: Sound<'_>) -> Result<Self, ReportError> {
         let name = song.file.file_name().unwrap_or_default();
-        // Beats are heard in frames of the music, and shown in those of the dance.
-        let frame = |beat: &usize| (*beat as f64 * song.fps / FRAME_RATE).round() as usize;
-        let within = |beats: &[usize]| beats.iter().map(frame).filter(|it| *it < frames).collect();
+        let a_frame = 1.0 / (FRAME_RATE * song.request.frame_time);
+        let within = |beats: &[usize]| {
+            let beats = beats.iter().map(|&beat| beat as f64 * a_frame);
+            let beats = beats.map(|beat| beat.round() as usize);
+            beats.filter(|&beat| beat < frames).collect()
+        };
         Ok(Self {
             name: name.to_string_lossy().into(),
             source: sound.source(&song.file)?,
@@ -83,20 +85,21 @@ fn embedded(file: &Path) -> Result<String, FileError> {
     Ok(format!("data:audio/{kind};base64,{content}"))
 }
 
-/// The page of what a model made of a song, HTML: key poses stand where the dance has its root.
+/// The page of what a model made of a song, one dance or several, HTML: key poses stand where the
+/// first dance has its root.
 ///
 /// # Errors
-/// A dance on another skeleton than the dance skeleton, a sound that the page cannot have.
+/// There is no dance; a sound that the page cannot have.
 pub fn song_page(
     model: &str,
     song: &Song,
-    dance: &Clip,
+    dances: &[&Clip],
     data: &DataConfig,
     sound: Sound<'_>,
 ) -> Result<String, ReportError> {
+    let nothing = || ReportError::Refused("there is no dance to show".into());
+    let dance = *dances.first().ok_or_else(nothing)?;
     let music = ViewerMusic::of(song, dance.poses.len(), sound)?;
-    let measured = DanceClip::measure(dance.clone(), &data.features());
-    let measured = measured.map_err(|error| ModelError::data(&error))?;
     let keys = song.request.given.iter();
     let keys = keys.filter(|given| given.frame >= song.seed as i64);
     let keyframes = keys.map(|given| {
@@ -106,16 +109,40 @@ pub fn song_page(
         let positions = world.iter().map(|joint| *joint + there).collect();
         ViewerKeyframe { frame, positions }
     });
-    let features = measured.features.view();
+    let name = |number: usize| match dances.len() {
+        1 => model.to_string(),
+        _ => format!("{model} {}", number + 1),
+    };
+    let kind = |number| match number {
+        0 => MotionKind::Model,
+        _ => MotionKind::Other,
+    };
+    // Of another body than the dance skeleton there are no features to show.
+    let measured: Result<Vec<DanceClip>, _> = dances
+        .iter()
+        .map(|dance| DanceClip::measure((*dance).clone(), &data.features()))
+        .collect();
+    let (body, motions) = match &measured {
+        Ok(measured) => {
+            let motions = measured.iter().enumerate().map(|(number, dance)| {
+                let features = dance.features.view();
+                ViewerMotion::from_features(&name(number), kind(number), features)
+            });
+            (ViewerBody::dance(), motions.collect())
+        }
+        Err(_) => {
+            let motions = dances.iter().enumerate().map(|(number, dance)| {
+                let contacts = vec![[false; 4]; dance.poses.len()];
+                ViewerMotion::from_clip(&name(number), kind(number), dance, contacts)
+            });
+            (ViewerBody::of(&dance.skeleton), motions.collect())
+        }
+    };
     let viewer = Viewer {
         title: format!("{} to {}", dance.name, music.name),
         frame_time: dance.frame_time,
-        body: ViewerBody::dance(),
-        motions: vec![ViewerMotion::from_features(
-            model,
-            MotionKind::Model,
-            features,
-        )],
+        body,
+        motions,
         keyframes: keyframes.collect(),
         asked: None,
         music: Some(music),

@@ -25,7 +25,8 @@ pub(super) fn make(
         ));
     }
     let choice = wanted.choice(&asked.keyframes)?;
-    let song = Song::read(&choice, model, data, &Cache::of_user())?;
+    let mut song = Song::read(&choice, model, data, &Cache::of_user())?;
+    song.request.seed = asked.seed;
     let unread = asked.unread(&model.needs()).into_iter();
     unread.map(left_out).for_each(&mut *warn);
     song.notices.iter().cloned().for_each(warn);
