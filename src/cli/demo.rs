@@ -30,10 +30,13 @@ const MISSED: u8 = 4;
 /// cores: the model is to be ahead in LRP at 100 and 150 frames, of interpolation and of the linear
 /// estimate that it was before its training. Of Pu and Shan (pu2022), with music, five minutes: its
 /// consistency error is to be below half of a held pose's, and its beats to hit those of the music
-/// more often than by chance (97.5 % of 200 shifts of the beats). Exit code 4 if the goal is missed.
+/// more often than by chance (97.5 % of 200 shifts of the beats). Of Valle-Pérez et al.
+/// (valleperez2021), with music, three minutes: no dance is to freeze or diverge, the mean step to
+/// be at most 1.5 times the data's, diversity above a third of it. Exit code 4 if the goal is
+/// missed.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Paper whose model is shown: pan2021, pu2022 [default: pan2021]
+    /// Paper whose model is shown: pan2021, pu2022, valleperez2021 [default: pan2021]
     #[arg(long, value_name = "NAME")]
     paper: Option<String>,
     /// Folder for the results; those of an earlier demo there are replaced [default: results/demo;

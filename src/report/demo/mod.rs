@@ -7,6 +7,8 @@ mod losses;
 pub mod pan2021;
 #[cfg(feature = "papers")]
 pub mod pu2022;
+#[cfg(feature = "papers")]
+pub mod valleperez2021;
 
 pub use losses::Losses;
 
@@ -59,6 +61,11 @@ pub trait Demo {
 
     /// What is scored beside the model; `untrained` is the model before its training.
     fn others(&self, untrained: Box<dyn Generator>) -> Vec<Other>;
+
+    /// The protocol that scores it; none: the first of the model's.
+    fn protocol(&self) -> Option<&'static str> {
+        None
+    }
 
     /// The metrics of its tables; none: those of the paper's, with its numbers.
     fn metrics(&self) -> &'static [&'static str] {
@@ -190,9 +197,17 @@ pub fn compare(
     evaluate: impl Fn(&dyn Protocol, &dyn Generator) -> Result<Evaluation, EvaluationError>,
 ) -> Result<(String, Verdict), ReportError> {
     let (config, folder) = (demo.experiment(), run.path());
-    // The first one alone: a paper's numbers are of other data, so how it counted adds nothing.
-    let protocols = &config.protocols()[..1];
-    let protocol = &*protocols[0];
+    // One alone: a paper's numbers are of other data, so how it counted adds nothing.
+    let mut protocols = config.protocols();
+    protocols.retain(|it| demo.protocol().is_none_or(|wanted| wanted == it.name()));
+    protocols.truncate(1);
+    let protocol = protocols.first().ok_or_else(|| {
+        let kind = config.model.kind();
+        ReportError::Refused(format!(
+            "model.kind = {kind} has no protocol to score it by"
+        ))
+    })?;
+    let (protocol, protocols) = (&**protocol, &protocols[..]);
     let evaluate = |model: &dyn Generator| -> Result<ProtocolScores, EvaluationError> {
         let scores = evaluate(protocol, model)?.scores;
         Ok(ProtocolScores::new([(protocol.name(), scores)]))

@@ -54,7 +54,7 @@ pub(super) fn write(
     bvh::write(&folder.join(DANCE), &document)?;
     let viewer = folder.join(VIEWER);
     let sound = Sound::Beside(&viewer);
-    let page = song_page(&config.name, &song, &dance, &config.data, sound)?;
+    let page = song_page(&config.name, &song, &[&dance], &config.data, sound)?;
     replace_file(&viewer, page)?;
     Ok(format!(
         "{DANCE}: a dance to {SONG} of {} after the first 2 s of {RECORDED} ({}), {}",
