@@ -42,6 +42,7 @@ mod retrieval;
 mod root_frame;
 mod rotations;
 mod sampled_dance;
+mod sampled_training;
 mod schedule;
 mod step_batches;
 mod synthesis;

@@ -504,3 +504,33 @@ fn moglow_log_densities_of_the_last_frames_and_of_those_before_add_up_to_its_los
         assert!((first[k] + last[k] - all[k]).abs() < 1e-9);
     }
 }
+
+#[test]
+fn sixteen_blocks_in_single_precision_and_back_miss_by_less_than_a_thousandth() {
+    let config = ValleperezConfig {
+        flow_width: 32,
+        flow_heads: 4,
+        flow_feed_forward: 32,
+        ..ValleperezConfig::default()
+    };
+    assert_eq!((config.blocks, config.predicted_frames), (16, 3));
+    let mut rng = rng(7);
+    let mut parameters = Parameters::<f32>::new();
+    let mut init = Initialiser::new(&mut parameters, &mut rng);
+    let flow = Flow::new(&mut init, &config, 61, 20, None).expect("sizes that fit");
+    let mut draw = |rows, columns| {
+        Array2::from_shape_simple_fn((rows, columns), || rng.random_range(-2.0f32..2.0))
+    };
+    let (x, h) = (draw(30, 61), draw(30, 20));
+    flow.start(&mut parameters, x.clone(), &h).unwrap();
+    let mut workspace = Workspace::new();
+    let mut tape = Tape::inference(&parameters, &mut workspace);
+    let (given, h) = (tape.constant(x.clone()), tape.constant(h));
+    let z = flow.forward(&mut tape, given, h, false).unwrap().z;
+    let noise = tape.values(z).iter().map(|&z| f64::from(z)).collect();
+    let noise = Array2::from_shape_vec(x.dim(), noise).unwrap();
+    let back = flow.inverse(&mut tape, &noise, h).unwrap();
+    let error = (back - x.mapv(f64::from)).mapv(f64::abs);
+    let worst = error.iter().copied().fold(0.0, f64::max);
+    assert!(worst < 1e-3, "{worst}");
+}
