@@ -93,7 +93,7 @@ impl Analysis {
     /// In `paper15` beat and downbeat are exp(-0.5 d^2), d the frames to the nearest one; in
     /// `fact35` peak and beat are 1 in their frames and 0 elsewhere; in those of 20 frames a second
     /// beat and downbeat are [`beat_curve`]s and the onset strength is that of
-    /// [`rises`](twentieths::rises), in `onset_beats` as [`accents`].
+    /// [`rises`], in `onset_beats` as [`accents`].
     ///
     /// # Panics
     /// A field of the analysis was given another number of frames than the others have.

@@ -67,7 +67,10 @@ impl RunFolder {
     }
 
     /// Keeps a copy of the weights in a file that the run starts from.
-    pub(crate) fn keep_start(&self, weights: &Path) -> Result<(), RunError> {
+    ///
+    /// # Errors
+    /// It cannot be read or written.
+    pub fn keep_start(&self, weights: &Path) -> Result<(), RunError> {
         let content = std::fs::read(weights).map_err(FileError::at(weights, "read"))?;
         Ok(replace_file(&self.path().join(START_FILE), content)?)
     }

@@ -587,7 +587,8 @@ fn means_intervals_and_tests_are_those_of_scipy_and_statsmodels() {
 
 #[test]
 fn too_few_ratings_and_equal_ones_are_stated() {
-    let cases: [(&[(&str, &[u8])], &str, &str); 5] = [
+    type Files<'f> = &'f [(&'f str, &'f [u8])];
+    let cases: [(Files<'_>, &str, &str); 5] = [
         (
             &[("a", &[4, 5, 3])],
             "fewer than two models have ratings",

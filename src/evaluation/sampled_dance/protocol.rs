@@ -74,6 +74,11 @@ struct Made {
     dance: Option<Dance>,
 }
 
+/// A column: its name, its dances, and recordings by number with what was recorded.
+type Group<'m> = (&'static str, Vec<&'m Made>, Vec<(usize, &'m Dance)>);
+/// Scores by the keys of their metrics.
+type KeyedScores = Vec<(&'static str, f64)>;
+
 struct Stage<'d> {
     model: &'d dyn Generator,
     sampler: Sampler,
@@ -184,7 +189,7 @@ fn group(
     made: &[&Made],
     real: &[(usize, &Dance)],
     beats: &[Vec<f64>],
-) -> Vec<(&'static str, f64)> {
+) -> KeyedScores {
     let dances: Vec<&Dance> = made.iter().filter_map(|it| it.dance.as_ref()).collect();
     let raw: Vec<ArrayView2<'_, f64>> = dances.iter().map(|it| it.raw.view()).collect();
     let recorded: Vec<ArrayView2<'_, f64>> = real.iter().map(|it| it.1.raw.view()).collect();
@@ -397,7 +402,7 @@ impl Protocol for SampledDance {
             let name = song(&recordings[index]);
             data.train.iter().any(|it| song(it) == name)
         };
-        let mut groups: Vec<(&str, Vec<&Made>, Vec<(usize, &Dance)>)> = Vec::new();
+        let mut groups: Vec<Group<'_>> = Vec::new();
         let every: Vec<(usize, &Dance)> = real.iter().enumerate().collect();
         groups.push((ALL, made.iter().collect(), every.clone()));
         let heard = (0..recordings.len())
@@ -411,10 +416,10 @@ impl Protocol for SampledDance {
             }
         }
         groups.push((WITHOUT_MUSIC, silent.iter().collect(), every));
-        let scored: Vec<(&str, usize, Vec<(&'static str, f64)>)> = groups
-            .iter()
-            .map(|(name, made, real)| (*name, made.len(), group(&stage, made, real, &beats)))
-            .collect();
+        let scored = groups.iter();
+        let scored =
+            scored.map(|(name, made, real)| (*name, made.len(), group(&stage, made, real, &beats)));
+        let scored: Vec<(&str, usize, KeyedScores)> = scored.collect();
         let mut rows: Vec<(&'static str, ScoreRow)> = METRICS
             .iter()
             .filter_map(|metric| {

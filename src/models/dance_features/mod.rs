@@ -10,7 +10,7 @@
 //! - [`windows`]: at which frames there is a window, [`epochs`]: in which order they are trained;
 //! - [`given`]: from a request to these numbers, and back to a dance; [`sampled`]: a dance that
 //!   grows;
-//! - [`made_up`]: generated dances, for timings.
+//! - [`mod@made_up`]: generated dances, for timings.
 
 pub mod config;
 pub mod epochs;

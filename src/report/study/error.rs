@@ -14,7 +14,10 @@ pub enum StudyError {
     #[error("{0}")]
     Refused(String),
     #[error("the dances of {model}")]
-    Dances { model: String, source: DataError },
+    Dances {
+        model: String,
+        source: Box<DataError>,
+    },
     #[error("the music of the study")]
     Music(#[source] DataError),
     #[error("{file} is not the key of a study; give the key.json that lies beside its page")]

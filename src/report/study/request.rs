@@ -198,7 +198,8 @@ impl StudyRequest {
             let mut questions = self.questions.iter();
             questions.any(|question| question.is_of_pairs() == of_pairs)
         };
-        let whole = asks(false).then(|| PageClip::shown(dance, &[0..longest.min(frames)]));
+        let first = 0..longest.min(frames);
+        let whole = asks(false).then(|| PageClip::shown(dance, std::slice::from_ref(&first)));
         let pair = asks(true).then(|| PageClip::shown(dance, &[0..piece, frames - piece..frames]));
         Ok(PageClip {
             id: id.into(),

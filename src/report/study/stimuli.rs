@@ -39,7 +39,7 @@ pub(super) fn stimuli(
     let folders = models.iter().map(|StudyModel { name, folder }| {
         clip_files(folder).map_err(|source| StudyError::Dances {
             model: name.clone(),
-            source,
+            source: source.into(),
         })
     });
     let folders: Vec<BTreeMap<String, PathBuf>> = folders.collect::<Result<_, _>>()?;

@@ -126,14 +126,14 @@ pub fn song_page(
         Ok(measured) => {
             let motions = measured.iter().enumerate().map(|(number, dance)| {
                 let features = dance.features.view();
-                ViewerMotion::from_features(&name(number), kind(number), features)
+                ViewerMotion::from_features(name(number), kind(number), features)
             });
             (ViewerBody::dance(), motions.collect())
         }
         Err(_) => {
             let motions = dances.iter().enumerate().map(|(number, dance)| {
                 let contacts = vec![[false; 4]; dance.poses.len()];
-                ViewerMotion::from_clip(&name(number), kind(number), dance, contacts)
+                ViewerMotion::from_clip(name(number), kind(number), dance, contacts)
             });
             (ViewerBody::of(&dance.skeleton), motions.collect())
         }
