@@ -1,17 +1,18 @@
 //! How far two sets of vectors lie apart, by their first two moments.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, SVD, SymmetricEigen};
 use ndarray::{Array1, ArrayView2, Axis};
 
 /// Steps after which no eigenvalues are expected any more.
 const MOST_STEPS: usize = 10_000;
 
-/// Mean and second moment of a set of vectors.
+/// Mean and second moment S of a set of vectors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moments {
     mean: Array1<f64>,
-    /// `[numbers, numbers]`.
-    second: DMatrix<f64>,
+    trace: f64,
+    /// F with F^T F = S, `[numbers, numbers]`.
+    factor: DMatrix<f64>,
 }
 
 impl Moments {
@@ -22,59 +23,87 @@ impl Moments {
         if vectors.nrows() < 2 || !is_finite(vectors) {
             return None;
         }
-        let mean = vectors.mean_axis(Axis(0))?;
-        let centred = &vectors - &mean;
-        let second = products(centred.view(), vectors.nrows() as f64 - 1.0);
-        Some(Self { mean, second })
+        Self::with(vectors, covariance(vectors)?)
     }
 
     /// Mean and, in the covariance's place, the mean of x x^T about the origin, of `[vectors,
     /// numbers]`. None of none, and where a number is not finite.
     #[must_use]
     pub fn about_origin(vectors: ArrayView2<'_, f64>) -> Option<Self> {
-        if !is_finite(vectors) {
+        if vectors.is_empty() || !is_finite(vectors) {
             return None;
         }
-        let mean = vectors.mean_axis(Axis(0))?;
-        let second = products(vectors, vectors.nrows() as f64);
-        Some(Self { mean, second })
+        Self::with(vectors, products(vectors, vectors.nrows() as f64))
+    }
+
+    fn with(vectors: ArrayView2<'_, f64>, second: DMatrix<f64>) -> Option<Self> {
+        let (mean, trace) = (vectors.mean_axis(Axis(0))?, second.trace());
+        if mean.is_empty() {
+            return None;
+        }
+        let SymmetricEigen {
+            eigenvectors,
+            mut eigenvalues,
+        } = eigen(second)?;
+        eigenvalues.apply(|value| *value = value.max(0.0).sqrt());
+        let factor = DMatrix::from_diagonal(&eigenvalues) * eigenvectors.transpose();
+        Some(Self {
+            mean,
+            trace,
+            factor,
+        })
     }
 
     /// Frechet distance |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), a squared length; of the
     /// normal distributions where S is a covariance.
     ///
-    /// By symmetric eigenvalues: tr (S1 S2)^(1/2) is the sum of the roots of those of S1^(1/2) S2
-    /// S1^(1/2), negative ones of rounding taken as 0. None of other numbers of numbers.
+    /// The roots of the eigenvalues of S1^(1/2) S2 S1^(1/2) are the singular values of F1 F2^T,
+    /// which are told without squaring: the roots of small eigenvalues would be rounding of the
+    /// large ones. None of other numbers of numbers.
     #[must_use]
     pub fn distance(&self, other: &Self) -> Option<f64> {
         if self.mean.len() != other.mean.len() {
             return None;
         }
-        if self.mean.is_empty() {
-            return Some(0.0);
-        }
         let means = &self.mean - &other.mean;
-        let traces = self.second.trace() + other.second.trace();
-        let SymmetricEigen {
-            eigenvectors,
-            mut eigenvalues,
-        } = eigen(self.second.clone())?;
-        eigenvalues.apply(|value| *value = value.max(0.0).sqrt());
-        let root = &eigenvectors * DMatrix::from_diagonal(&eigenvalues) * eigenvectors.transpose();
-        let product = &root * &other.second * &root;
-        // Rounding alone makes it unequal to its transpose.
-        let product = (&product + product.transpose()) * 0.5;
-        let roots = eigen(product)?.eigenvalues;
-        let shared: f64 = roots.iter().map(|value| value.max(0.0).sqrt()).sum();
-        Some((means.dot(&means) + traces - 2.0 * shared).max(0.0))
+        let product = &self.factor * other.factor.transpose();
+        let svd = SVD::try_new(product, false, false, f64::EPSILON, MOST_STEPS)?;
+        let shared = svd.singular_values.sum();
+        Some((means.dot(&means) + self.trace + other.trace - 2.0 * shared).max(0.0))
     }
 }
 
-/// Frechet distance of the normal distributions of two sets of vectors (FID of features),
-/// `[vectors, numbers]` each; see [`Moments`].
+/// Frechet distance of the normal distributions of two sets of standardised features (FID),
+/// `[windows, features]` each: |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), covariances with n - 1.
+///
+/// By symmetric eigenvalues: tr (S1 S2)^(1/2) is the sum of the roots of those of S1^(1/2) S2
+/// S1^(1/2), negative ones of rounding taken as 0. None of fewer than two windows or other numbers
+/// of features, and where a number is not finite. Of numbers of several units, some of them far
+/// larger than others, [`Moments`] loses fewer digits.
 #[must_use]
 pub fn frechet_distance(a: ArrayView2<'_, f64>, b: ArrayView2<'_, f64>) -> Option<f64> {
-    Moments::of(a)?.distance(&Moments::of(b)?)
+    let is_finite = a.iter().chain(&b).all(|x| x.is_finite());
+    if a.nrows() < 2 || b.nrows() < 2 || a.ncols() != b.ncols() || !is_finite {
+        return None;
+    }
+    if a.ncols() == 0 {
+        return Some(0.0);
+    }
+    let means = a.mean_axis(Axis(0))? - b.mean_axis(Axis(0))?;
+    let (first, second) = (covariance(a)?, covariance(b)?);
+    let traces = first.trace() + second.trace();
+    let SymmetricEigen {
+        eigenvectors,
+        mut eigenvalues,
+    } = eigen(first)?;
+    eigenvalues.apply(|value| *value = value.max(0.0).sqrt());
+    let root = &eigenvectors * DMatrix::from_diagonal(&eigenvalues) * eigenvectors.transpose();
+    let product = &root * second * &root;
+    // Rounding alone makes it unequal to its transpose.
+    let product = (&product + product.transpose()) * 0.5;
+    let roots = eigen(product)?.eigenvalues;
+    let shared: f64 = roots.iter().map(|value| value.max(0.0).sqrt()).sum();
+    Some((means.dot(&means) + traces - 2.0 * shared).max(0.0))
 }
 
 fn is_finite(vectors: ArrayView2<'_, f64>) -> bool {
@@ -83,6 +112,12 @@ fn is_finite(vectors: ArrayView2<'_, f64>) -> bool {
 
 fn eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, nalgebra::Dyn>> {
     SymmetricEigen::try_new(matrix, f64::EPSILON, MOST_STEPS)
+}
+
+/// With n - 1, `[numbers, numbers]`.
+fn covariance(vectors: ArrayView2<'_, f64>) -> Option<DMatrix<f64>> {
+    let centred = &vectors - &vectors.mean_axis(Axis(0))?;
+    Some(products(centred.view(), vectors.nrows() as f64 - 1.0))
 }
 
 /// Sum of x x^T over `[vectors, numbers]`, divided by `count`.
@@ -161,6 +196,21 @@ mod tests {
         assert_eq!(frechet_distance(endless.view(), some.view()), None);
         assert_eq!(Moments::about_origin(endless.view()), None);
         assert_eq!(Moments::about_origin(Array2::zeros((0, 3)).view()), None);
+    }
+
+    #[test]
+    fn moments_give_the_distance_of_normal_distributions() {
+        for (windows, features) in [(40, 6), (5, 12)] {
+            let (a, b) = (
+                waves(windows, features, 0.23),
+                waves(30, features, 0.71) * 1.7,
+            );
+            let [first, second] = [&a, &b].map(|set| Moments::of(set.view()).unwrap());
+            let expected = frechet_distance(a.view(), b.view()).unwrap();
+            let distance = first.distance(&second).unwrap();
+            assert!((distance - expected).abs() < 1e-6, "{distance} {expected}");
+            assert!(first.distance(&first).unwrap() < 1e-12);
+        }
     }
 
     #[test]

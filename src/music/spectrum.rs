@@ -18,8 +18,8 @@ pub const BINS: usize = WINDOW / 2 + 1;
 /// Frame k is the window of 2,048 samples around sample 735 k, zeros where it reaches beyond the
 /// sound, times the periodic Hann window 0.5 - 0.5 cos(2 pi n / 2048): librosa's `stft` with
 /// `center=True, pad_mode="constant"`, squared. Other windows and centres may be asked for.
-pub struct PowerSpectra<'a> {
-    samples: &'a [f32],
+pub struct PowerSpectra<'a, S = f32> {
+    samples: &'a [S],
     hann: Vec<f64>,
     transform: Arc<dyn RealToComplex<f64>>,
     windowed: Vec<f64>,
@@ -28,16 +28,16 @@ pub struct PowerSpectra<'a> {
     power: Vec<f64>,
 }
 
-impl<'a> PowerSpectra<'a> {
+impl<'a, S: Copy + Into<f64>> PowerSpectra<'a, S> {
     /// Of samples at 22,050 Hz.
     #[must_use]
-    pub fn new(samples: &'a [f32]) -> Self {
+    pub fn new(samples: &'a [S]) -> Self {
         Self::with_window(samples, WINDOW)
     }
 
     /// The same through windows of another, even length.
     #[must_use]
-    pub fn with_window(samples: &'a [f32], length: usize) -> Self {
+    pub fn with_window(samples: &'a [S], length: usize) -> Self {
         let transform = RealFftPlanner::new().plan_fft_forward(length);
         Self {
             samples,
@@ -61,7 +61,7 @@ impl<'a> PowerSpectra<'a> {
         for (k, (into, weight)) in self.windowed.iter_mut().zip(&self.hann).enumerate() {
             let sample = (centre + k).checked_sub(half);
             let sample = sample.and_then(|at| self.samples.get(at));
-            *into = weight * f64::from(sample.copied().unwrap_or(0.0));
+            *into = weight * sample.map_or(0.0, |&sample| sample.into());
         }
         let (input, output) = (&mut self.windowed, &mut self.spectrum);
         let done = self

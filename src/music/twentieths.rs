@@ -41,7 +41,7 @@ pub struct Twentieths<T = f32> {
 impl Twentieths<f64> {
     /// Of samples at 22,050 Hz.
     #[must_use]
-    pub fn of(samples: &[f32]) -> Self {
+    pub fn of<S: Copy + Into<f64>>(samples: &[S]) -> Self {
         Self {
             mel: mel(samples),
             flux: flux(samples),
@@ -81,7 +81,7 @@ pub fn rises(decibels: ArrayView2<'_, f64>) -> Vec<f64> {
 }
 
 /// `[F, 80]`, dB.
-fn mel(samples: &[f32]) -> Array2<f64> {
+fn mel<S: Copy + Into<f64>>(samples: &[S]) -> Array2<f64> {
     let filters = MelFilters::up_to(MEL_BANDS, MEL_TOP);
     let mut spectra = PowerSpectra::with_window(samples, WINDOW);
     let mut mel = Array2::zeros((twentieths(samples.len()), MEL_BANDS));
@@ -96,7 +96,7 @@ fn mel(samples: &[f32]) -> Array2<f64> {
 }
 
 /// `[F, 8]`.
-fn flux(samples: &[f32]) -> Array2<f64> {
+fn flux<S: Copy + Into<f64>>(samples: &[S]) -> Array2<f64> {
     let rate = FRAME_RATE * FLUX_STEPS as f64;
     let mut spectra = PowerSpectra::with_window(samples, FLUX_WINDOW);
     let band_of = |bin: usize| {

@@ -470,7 +470,6 @@ fn mel_bands_and_rises_at_20_frames_a_second_are_those_of_an_independent_program
             *sample += 0.8 * 0.9_f64.powi(n as i32);
         }
     }
-    let samples: Vec<f32> = samples.into_iter().map(|x| x as f32).collect();
     let heard = Twentieths::of(&samples);
     let expected = example["mel_db"].as_array().unwrap();
     assert_eq!(heard.mel.dim(), (expected.len(), 80));

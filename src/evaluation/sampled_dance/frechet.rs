@@ -2,8 +2,8 @@
 //! section 9).
 //!
 //! All take two sets of dances, raw `[frames, columns]` each, and give squared lengths, cm^2 and
-//! rad^2 added up. None where moments cannot be told: too few frames, numbers of columns that
-//! differ, numbers that are not finite. The order of the two sets does not matter.
+//! rad^2 added up. None where moments cannot be told: too few frames, no or different columns,
+//! numbers that are not finite. The order of the two sets does not matter.
 
 use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
 
