@@ -2,9 +2,11 @@
 //! contacts that are true.
 
 use glam::DVec3;
+use keydance::data::BeatExtrema;
 use keydance::data::choreography::{
     ChoreographyConfig, ChoreographyError, GeneratedClip, generate, generate_with_music,
 };
+use keydance::evaluation::music_dance::beats::{joint_speed, motion_beats};
 use keydance::motion::skeleton::JOINTS;
 use keydance::music::{Analysis, Sound};
 use proptest::prelude::*;
@@ -282,4 +284,39 @@ fn music_is_on_the_dances_beats_and_the_tracker_finds_95_of_100_within_a_frame()
     assert_eq!(metres.into_iter().collect::<Vec<_>>(), [3, 4]);
     assert!(phases.len() > 4, "{phases:?}");
     assert_eq!(dances, generate_with_music(&config).unwrap());
+}
+
+#[test]
+fn dances_to_music_come_to_rest_on_its_beats_to_the_end() {
+    let config = ChoreographyConfig {
+        clips: 24,
+        frames_per_clip: 900,
+        seed: 77,
+    };
+    let dances = generate_with_music(&config).unwrap();
+    // The style that sways least between steps. Two of these four leap, which takes no whole beats
+    // by itself.
+    let folk = dances
+        .iter()
+        .filter(|it| it.dance.clip.name.contains("folk"));
+    for dance in folk {
+        let speed = joint_speed(&positions(&dance.dance));
+        let rests = motion_beats(&speed, BeatExtrema::Minima);
+        let (mut on, mut between) = (0, 0);
+        for beats in dance.beats.windows(2) {
+            let length = beats[1] - beats[0];
+            for rest in rests.iter().filter(|at| (beats[0]..beats[1]).contains(at)) {
+                // A body comes to rest a little after its feet.
+                match 8 * (rest - beats[0]) / length {
+                    0..=2 | 7 => on += 1,
+                    _ => between += 1,
+                }
+            }
+        }
+        let name = &dance.dance.clip.name;
+        assert!(
+            on > 3 * between,
+            "{name}: {on} on the beat, {between} between"
+        );
+    }
 }

@@ -118,7 +118,7 @@ pub fn clips(
 ) -> Result<impl Iterator<Item = GeneratedClip> + use<>, ChoreographyError> {
     check(config)?;
     let (frames, seed) = (config.frames_per_clip, config.seed);
-    Ok((0..config.clips).map(move |number| dance_of(number, frames, seed).0))
+    Ok((0..config.clips).map(move |number| dance_of(number, frames, seed, false).0))
 }
 
 fn check(config: &ChoreographyConfig) -> Result<(), ChoreographyError> {
@@ -139,7 +139,12 @@ fn check(config: &ChoreographyConfig) -> Result<(), ChoreographyError> {
 }
 
 /// One clip, on a random stream of its own, with its rhythm and the beats of a bar.
-fn dance_of(number: usize, frames: usize, seed: u64) -> (GeneratedClip, Rhythm, f64) {
+fn dance_of(
+    number: usize,
+    frames: usize,
+    seed: u64,
+    to_music: bool,
+) -> (GeneratedClip, Rhythm, f64) {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     rng.set_stream(number as u64);
     let style = Style::draw(number, &mut rng);
@@ -147,7 +152,7 @@ fn dance_of(number: usize, frames: usize, seed: u64) -> (GeneratedClip, Rhythm, 
     let rhythm = Rhythm::new(style.draw_tempo(&mut rng), style.rubato, &mut rng);
     let heading = rng.random_range(0.0..std::f64::consts::TAU);
     let bar = style.bar;
-    let mut score = Score::new(style, rhythm.clone(), heading);
+    let mut score = Score::new(style, rhythm.clone(), heading, to_music);
     let mut last: Option<Family> = None;
     while score.frame(0.0) < frames as f64 {
         if score.centre.length() > FARTHEST {

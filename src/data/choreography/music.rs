@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
+use rayon::prelude::*;
 
 use super::{ChoreographyConfig, ChoreographyError, GeneratedClip, check, dance_of};
 use crate::motion::Clip;
@@ -18,12 +19,12 @@ const ROOTS: [i32; 4] = [0, 5, 7, 9];
 const MIDDLE_C: f64 = 261.63;
 /// Amplitudes of a chord's note, of a drum, of the noise.
 const CHORD: f64 = 0.05;
-const DRUM: f64 = 0.5;
+const DRUM: f64 = 0.25;
 const NOISE: f64 = 0.002;
 /// A drum on another beat than the first of a bar.
 const UNACCENTED: f64 = 0.6;
 /// Longest that a drum sounds, s.
-const DRUM_SECONDS: f64 = 0.25;
+const DRUM_SECONDS: f64 = 0.04;
 
 /// A generated dance with its music.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,14 +40,18 @@ pub struct DanceWithMusic {
     pub metre: usize,
 }
 
-/// Generates dances with music: each begins somewhere in its first bar.
+/// Generates dances with music: each begins somewhere in its first bar, and its figures keep to
+/// whole beats.
 ///
 /// # Errors
 /// As [`super::generate`].
 pub fn generate_with_music(
     config: &ChoreographyConfig,
 ) -> Result<Vec<DanceWithMusic>, ChoreographyError> {
-    Ok(clips_with_music(config)?.collect())
+    check(config)?;
+    let numbers = (0..config.clips).into_par_iter();
+    let dances = numbers.map(|number| of_number(number, config.frames_per_clip, config.seed));
+    Ok(dances.collect())
 }
 
 /// The same one after the other, for more of them than memory holds.
@@ -65,7 +70,7 @@ fn of_number(number: usize, frames: usize, seed: u64) -> DanceWithMusic {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     rng.set_stream(STREAM + number as u64);
     let spare = rng.random_range(0..60);
-    let (mut dance, rhythm, bar) = dance_of(number, frames + spare, seed);
+    let (mut dance, rhythm, bar) = dance_of(number, frames + spare, seed, true);
     cut(&mut dance.clip, spare);
     dance.contacts.drain(..spare);
     let metre = bar as usize;
@@ -121,16 +126,14 @@ fn samples(
     sound.into_iter().map(|x| x as f32).collect()
 }
 
-/// A falling tone with a click, from a sample on.
+/// A dry stroke, from a sample on: noise, without a tone that would drown the chord's.
 fn drum(sound: &mut [f64], from: usize, strength: f64, rng: &mut ChaCha12Rng) {
     let length = (DRUM_SECONDS * RATE as f64) as usize;
-    let (mut phase, end) = (0.0, sound.len().min(from + length));
+    let end = sound.len().min(from + length);
     for (n, sample) in sound[from.min(end)..end].iter_mut().enumerate() {
         let time = n as f64 / RATE as f64;
-        phase += TAU * (50.0 + 90.0 * (-time / 0.03).exp()) / RATE as f64;
         let click = (-time / 0.004).exp() * rng.random_range(-1.0..1.0);
-        let tone = (-time / 0.07).exp() * phase.sin();
-        *sample += DRUM * strength * (tone + 0.5 * click);
+        *sample += DRUM * strength * click;
     }
 }
 

@@ -36,6 +36,9 @@ pub struct Jump {
 pub struct Score {
     pub style: Style,
     pub rhythm: Rhythm,
+    /// Whether there is music, so that every figure takes whole beats; without it some take half
+    /// ones.
+    pub to_music: bool,
     /// Where the score has got to, beats.
     pub beat: f64,
     /// The middle of the dancer's base on the floor (x, z), cm.
@@ -64,9 +67,10 @@ pub struct Score {
 
 impl Score {
     /// A dancer who stands in the middle, ready to begin.
-    pub fn new(style: Style, rhythm: Rhythm, heading: f64) -> Self {
+    pub fn new(style: Style, rhythm: Rhythm, heading: f64, to_music: bool) -> Self {
         let mut score = Self {
             rhythm,
+            to_music,
             beat: 0.0,
             centre: DVec2::ZERO,
             heading,

@@ -110,7 +110,8 @@ fn point(score: &mut Score, rng: &mut ChaCha12Rng) {
     let foot = score.free;
     let side = foot.side();
     let times = rng.random_range(1..3u8);
-    let unit = if score.rhythm.beat() < 20.0 { 1.0 } else { 0.8 };
+    let whole = score.to_music || score.rhythm.beat() < 20.0;
+    let unit = if whole { 1.0 } else { 0.8 };
     let beats = (4.0 * unit * f64::from(times)).ceil();
     let ways = [(1.0, 0.1 * side), (0.1, side), (-0.9, 0.1 * side)];
     let mut chosen = (0.0, side);

@@ -157,7 +157,10 @@ fn leap(score: &mut Score, rng: &mut ChaCha12Rng) {
     score.tilt(beats, [0.0; 2]);
     score.sink(0.0, 0.0);
     let rest = (closed - score.frame(0.0)) / score.rhythm.beat();
-    let beats = beats.max((2.0 * rest).ceil() / 2.0 + 0.5);
+    let beats = beats.max(match score.to_music {
+        true => (rest + 0.5).ceil(),
+        false => (2.0 * rest).ceil() / 2.0 + 0.5,
+    });
     score.sink(beats, 0.0);
     score.free = push;
     score.advance(beats);
