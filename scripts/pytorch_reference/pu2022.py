@@ -97,9 +97,23 @@ class Pu2022(nn.Module):
         return self.output(crossed).flatten(0, 1)
 
 
-def losses(said, batch, windows):
-    """Eq. 14 and the same without weights, each a scalar by its name."""
-    squares = (batch["truth"] - said).square().sum(-1)
-    frames = len(squares)
-    weighted = (batch["weights"][:, 0] * squares).sum() / frames
-    return {"weighted": weighted, "plain": squares.sum() / frames, "total": weighted}
+def losses(said, batch, windows, root_weight=1.0, velocity_weight=0.0):
+    """Eq. 14, the same without weights and, where it has a weight, the term of velocities, each a
+    scalar by its name."""
+    difference = batch["truth"] - said
+
+    def of_frames(x):
+        squares = x.square()
+        if root_weight != 1:
+            squares = torch.cat([squares[:, :-3], root_weight * squares[:, -3:]], 1)
+        return squares.sum(-1)
+
+    frames = len(difference)
+    weighted = (batch["weights"][:, 0] * of_frames(difference)).sum() / frames
+    terms = {"weighted": weighted, "plain": difference.square().sum() / frames, "total": weighted}
+    if velocity_weight > 0:
+        of_windows = difference.reshape(windows, frames // windows, -1)
+        changes = of_windows.diff(dim=1, prepend=torch.zeros_like(of_windows[:, :1]))
+        terms["velocity"] = of_frames(changes.flatten(0, 1)).sum() / frames
+        terms["total"] = weighted + velocity_weight * terms["velocity"]
+    return terms

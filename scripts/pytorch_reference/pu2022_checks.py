@@ -50,7 +50,10 @@ def check(weights, config, batch_path, tolerance=None):
         raise SystemExit(f"{weights}: {error}") from None
     given = {name: batch[name].double() for name in GIVEN}
     said = model(given, windows)
-    terms = losses(said, given, windows)
+    # A config from before these has none.
+    loss = config["loss"]
+    root, velocity = loss.get("root_weight", 1.0), loss.get("velocity_weight", 0.0)
+    terms = losses(said, given, windows, root, velocity)
     terms["total"].backward()
     found = {"output": said.detach()}
     found |= {f"loss.{name}": term.detach().reshape(1) for name, term in terms.items()}

@@ -181,10 +181,12 @@ fn local_positions_are_distances_to_the_known_frames_around() {
 }
 
 #[test]
-fn the_loss_weighs_frames_by_equation_15_and_means_over_windows_and_frames() {
+fn the_loss_weighs_frames_by_equation_15_the_root_and_velocities_and_means_over_frames() {
     let loss = LossConfig {
         lambda: 3.0,
         sigma: 0.1,
+        root_weight: 4.0,
+        velocity_weight: 7.0,
     };
     let keys = [9, 21];
     let weights = frame_weights(&keys, &WINDOW, &loss);
@@ -221,10 +223,20 @@ fn the_loss_weighs_frames_by_equation_15_and_means_over_windows_and_frames() {
     let mut expected = 0.0;
     for (window, (truth, keys)) in truths.iter().zip([&keys[..], &[]]).enumerate() {
         let weights = frame_weights(keys, &WINDOW, &loss);
+        let error = |frame: usize, number| {
+            truth[[frame, number]] - said[(window * 24 + frame) * 147 + number]
+        };
         for frame in 0..24 {
             for number in 0..147 {
-                let y = said[(window * 24 + frame) * 147 + number];
-                expected += weights[frame] * (truth[[frame, number]] - y).powi(2) / 48.0;
+                let root = if number < 144 { 1.0 } else { 4.0 };
+                let error_at = error(frame, number);
+                // The frame before the first is the seed's, which is no error.
+                let before = frame
+                    .checked_sub(1)
+                    .map_or(0.0, |before| error(before, number));
+                let change = error_at - before;
+                expected += root * weights[frame] * error_at.powi(2) / 48.0;
+                expected += root * 7.0 * change.powi(2) / 48.0;
             }
         }
     }

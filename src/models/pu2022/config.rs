@@ -82,7 +82,8 @@ pub struct WindowConfig {
     pub length: usize,
 }
 
-/// `[loss]`: the weight of a frame near key poses (eq. 15).
+/// `[loss]`: the weights of frames near key poses (eq. 15), of the root and of velocities; the
+/// paper has the first alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LossConfig {
@@ -90,6 +91,10 @@ pub struct LossConfig {
     pub lambda: f64,
     /// How far that reaches, as a share of the T - T' frames.
     pub sigma: f64,
+    /// How much the squared error of the root's place, m^2, weighs beside those of the rotations.
+    pub root_weight: f64,
+    /// How much the squared error of the change from frame to frame weighs beside that of a frame.
+    pub velocity_weight: f64,
 }
 
 /// `[schedule]`
@@ -151,6 +156,8 @@ impl Default for LossConfig {
         Self {
             lambda: 5.0,
             sigma: 0.05,
+            root_weight: 1.0,
+            velocity_weight: 0.0,
         }
     }
 }
@@ -197,9 +204,20 @@ impl Pu2022Settings {
         let window = &self.window;
         within("window.seed", window.seed, 1, 10_000)?;
         within("window.length", window.length, window.seed + 2, 20_000)?;
-        let LossConfig { lambda, sigma } = self.loss;
-        let usable = lambda.is_finite() && lambda >= 0.0;
-        ValueError::unless(usable, "loss.lambda", lambda, "0 or more")?;
+        let LossConfig {
+            lambda,
+            sigma,
+            root_weight,
+            velocity_weight,
+        } = self.loss;
+        for (key, value) in [
+            ("loss.lambda", lambda),
+            ("loss.root_weight", root_weight),
+            ("loss.velocity_weight", velocity_weight),
+        ] {
+            let usable = value.is_finite() && value >= 0.0;
+            ValueError::unless(usable, key, value, "0 or more")?;
+        }
         let usable = sigma.is_finite() && sigma > 0.0;
         ValueError::unless(usable, "loss.sigma", sigma, "more than 0")?;
         let schedule = &self.schedule;

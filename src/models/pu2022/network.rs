@@ -1,10 +1,11 @@
 //! The network: encoders of motion and music, the cross-modal Transformer, and what is added to its
 //! tokens.
 
+use ndarray::Array2;
 use rand::Rng;
 
 use super::batch::Batch;
-use super::config::{MusicSpan, Norm, Pu2022Config, Pu2022Settings};
+use super::config::{LossConfig, MusicSpan, Norm, Pu2022Config, Pu2022Settings};
 use crate::autograd::{AutogradError, Real, Tape, Var};
 use crate::models::LossTerms;
 use crate::nn::{
@@ -15,6 +16,7 @@ use crate::nn::{
 #[derive(Debug, Clone)]
 pub struct Pu2022 {
     config: Pu2022Config,
+    loss: LossConfig,
     motion_linear: Linear,
     music_linear: Linear,
     key_linear: Linear,
@@ -162,6 +164,7 @@ impl Pu2022 {
             cross: Encoder::new(init, "cross", config, config.cross_layers)?,
             output: Linear::new(init, "output", d, numbers),
             config: config.clone(),
+            loss: settings.loss.clone(),
         })
     }
 
@@ -265,7 +268,9 @@ impl Pu2022 {
     }
 
     /// L (eq. 14): the mean over windows and generated frames of w_t |y_t - y'_t|^2, and the same
-    /// without weights; a part of a step's.
+    /// without weights; a part of a step's. Where the config weighs them, too: the squares of the
+    /// root's place times `loss.root_weight`, and `velocity`, the mean of |(y_t - y_t-1) - (y'_t -
+    /// y'_t-1)|^2 with y'_T' = y_T', which the seed gives.
     ///
     /// # Errors
     /// A batch without its truth.
@@ -284,14 +289,56 @@ impl Pu2022 {
         let squares = tape.square(difference);
         let weights = tape.constant(batch.weights.clone());
         let weighted = tape.mul(squares, weights)?;
+        let weighted = self.weigh_root(tape, weighted)?;
+        let mut terms = vec![("weighted", 1.0, weighted), ("plain", 0.0, squares)];
+        if self.loss.velocity_weight > 0.0 {
+            let changes = changes(tape, difference, batch)?;
+            let squares = tape.square(changes);
+            let squares = self.weigh_root(tape, squares)?;
+            terms.push(("velocity", self.loss.velocity_weight, squares));
+        }
         let mean = 1.0 / (batch.total_windows * batch.window.generated()) as f64;
-        let [weighted, plain] = [weighted, squares].map(|it| tape.sum(it));
-        let weighted = tape.affine(weighted, mean, 0.0);
-        let plain = tape.affine(plain, mean, 0.0);
-        LossTerms::weighted(
-            tape,
-            &[("weighted", 1.0, weighted), ("plain", 0.0, plain)],
-            None,
-        )
+        for (_, _, term) in &mut terms {
+            let sum = tape.sum(*term);
+            *term = tape.affine(sum, mean, 0.0);
+        }
+        LossTerms::weighted(tape, &terms, None)
     }
+
+    /// Squares `[rows, 6 J + 3]`, those of the root's place weighted.
+    fn weigh_root<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        squares: Var,
+    ) -> Result<Var, AutogradError> {
+        if self.loss.root_weight == 1.0 {
+            return Ok(squares);
+        }
+        let numbers = tape.shape(squares)[1];
+        let weight = |number| match number + 3 < numbers {
+            true => T::one(),
+            false => T::from_f64(self.loss.root_weight),
+        };
+        let weights = Array2::from_shape_fn((1, numbers), |(_, number)| weight(number));
+        let weights = tape.constant(weights);
+        tape.mul(squares, weights)
+    }
+}
+
+/// Changes from each generated frame of a window to the next, the first from 0; values and changes
+/// are `[W (T - T'), numbers]`.
+fn changes<T: Real>(
+    tape: &mut Tape<'_, T>,
+    values: Var,
+    batch: &Batch<T>,
+) -> Result<Var, AutogradError> {
+    let shape = tape.shape(values).to_vec();
+    let (windows, numbers) = (batch.windows, shape[1]);
+    let generated = batch.window.generated();
+    let values = tape.reshape(values, &[windows, generated * numbers])?;
+    let before = tape.columns(values, 0..(generated - 1) * numbers)?;
+    let none = tape.constant_with(&[windows, numbers], |out| out.fill(T::zero()));
+    let before = tape.concat(&[none, before])?;
+    let changes = tape.sub(values, before)?;
+    tape.reshape(changes, &shape)
 }

@@ -27,7 +27,12 @@ pub fn figure_4(asked: &FigureRequest<'_>) -> Result<Figure, ReportError> {
     let mut numbers = Numbers::default();
     let mut lines = Vec::new();
     for (colour, (lambda, sigma)) in PAIRS.into_iter().enumerate() {
-        let weights = frame_weights(&keys, &window, &LossConfig { lambda, sigma });
+        let loss = LossConfig {
+            lambda,
+            sigma,
+            ..LossConfig::default()
+        };
+        let weights = frame_weights(&keys, &window, &loss);
         let row = format!("lambda {lambda}, sigma {sigma}");
         let mean = weights.iter().sum::<f64>() / weights.len() as f64;
         let most = weights.iter().copied().fold(0.0, f64::max);
