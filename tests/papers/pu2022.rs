@@ -115,6 +115,9 @@ fn gradients_are_those_of_central_differences_at_every_open_point() {
     cases[1].model.norm = Norm::Pre;
     cases.push(cases[1].clone());
     cases[2].model.music_span = MusicSpan::Whole;
+    cases.push(cases[1].clone());
+    cases[3].loss.root_weight = 3.0;
+    cases[3].loss.velocity_weight = 20.0;
     for settings in cases {
         for (title, report) in settings.check_gradients(&options).unwrap() {
             let model = &settings.model;
