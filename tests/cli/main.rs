@@ -35,6 +35,7 @@ mod outputs;
 mod report;
 mod reproduce;
 mod rotations;
+mod sampled;
 mod song;
 mod song_figures;
 mod stopped;
