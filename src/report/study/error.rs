@@ -19,7 +19,7 @@ pub enum StudyError {
         source: Box<DataError>,
     },
     #[error("the music of the study")]
-    Music(#[source] DataError),
+    Music(#[source] Box<DataError>),
     #[error("{file} is not the key of a study; give the key.json that lies beside its page")]
     Key {
         file: PathBuf,
@@ -32,7 +32,7 @@ pub enum StudyError {
     #[error(transparent)]
     Bvh(#[from] BvhError),
     #[error(transparent)]
-    Clip(#[from] DataError),
+    Clip(#[from] Box<DataError>),
     #[error(transparent)]
     Figure(#[from] FigureError),
     #[error(transparent)]

@@ -1,7 +1,5 @@
 //! The page of a study: `study.html` with the viewer's scripts, and the clips as JSON.
 
-use std::ops::Range;
-
 use glam::DVec3;
 use serde::Serialize;
 
@@ -64,15 +62,17 @@ impl From<Question> for PageQuestion {
 }
 
 impl PageClip {
-    /// Pieces of a dance side by side, all of one length; `A`, `B` where there are several.
-    pub(super) fn shown(dance: &Clip, pieces: &[Range<usize>]) -> Result<PageData, StudyError> {
+    /// Pieces of a dance side by side, each from a frame on and all of one length; `A`, `B` where
+    /// there are several.
+    pub(super) fn shown(dance: &Clip, pieces: &[(usize, usize)]) -> Result<PageData, StudyError> {
         let names: &[&str] = if pieces.len() > 1 { &["A", "B"] } else { &[""] };
-        let motions = pieces.iter().zip(names).map(|(piece, name)| {
+        let motions = pieces.iter().zip(names).map(|(&(first, frames), name)| {
+            let poses = dance.poses.iter().skip(first).take(frames);
             let clip = Clip {
-                poses: dance.poses[piece.clone()].to_vec(),
+                poses: poses.cloned().collect(),
                 ..dance.clone()
             };
-            let contacts = vec![[false; 4]; piece.len()];
+            let contacts = vec![[false; 4]; clip.poses.len()];
             let mut motion = ViewerMotion::from_clip(*name, MotionKind::Model, &clip, contacts);
             centre(&mut motion.positions);
             motion

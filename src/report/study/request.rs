@@ -144,7 +144,8 @@ impl StudyRequest {
     ) -> Result<Vec<Clip>, StudyError> {
         let mut dances = Vec::new();
         for file in &stimulus.dances {
-            let reading = FileReading::of(bvh::read(file)?.to_clip(), None, &self.data)?;
+            let clip = bvh::read(file)?.to_clip();
+            let reading = FileReading::of(clip, None, &self.data).map_err(Box::new)?;
             let named = |notice| format!("{}: {notice}", file.display());
             notices.extend(reading.notices.into_iter().map(named));
             dances.push(reading.recording.clip);
@@ -198,9 +199,9 @@ impl StudyRequest {
             let mut questions = self.questions.iter();
             questions.any(|question| question.is_of_pairs() == of_pairs)
         };
-        let first = 0..longest.min(frames);
-        let whole = asks(false).then(|| PageClip::shown(dance, std::slice::from_ref(&first)));
-        let pair = asks(true).then(|| PageClip::shown(dance, &[0..piece, frames - piece..frames]));
+        let whole = asks(false).then(|| PageClip::shown(dance, &[(0, longest.min(frames))]));
+        let pair =
+            asks(true).then(|| PageClip::shown(dance, &[(0, piece), (frames - piece, piece)]));
         Ok(PageClip {
             id: id.into(),
             song,

@@ -39,7 +39,7 @@ pub(super) fn stimuli(
     let folders = models.iter().map(|StudyModel { name, folder }| {
         clip_files(folder).map_err(|source| StudyError::Dances {
             model: name.clone(),
-            source: source.into(),
+            source: Box::new(source),
         })
     });
     let folders: Vec<BTreeMap<String, PathBuf>> = folders.collect::<Result<_, _>>()?;
@@ -52,7 +52,7 @@ pub(super) fn stimuli(
         check_same((&model.name, dances), (&models[0].name, first))?;
     }
     let sounds = music.map(sound_files).transpose();
-    let sounds = sounds.map_err(StudyError::Music)?;
+    let sounds = sounds.map_err(|error| StudyError::Music(Box::new(error)))?;
     let stimulus = |name: &String| {
         let sound = sounds.as_ref().map(|sounds| {
             sound_of(name, sounds).cloned().ok_or_else(|| {
