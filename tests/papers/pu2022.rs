@@ -229,7 +229,7 @@ fn the_loss_weighs_frames_by_equation_15_the_root_and_velocities_and_means_over_
         let error = |frame: usize, number| {
             truth[[frame, number]] - said[(window * 24 + frame) * 147 + number]
         };
-        for frame in 0..24 {
+        for (frame, weight) in weights.iter().enumerate() {
             for number in 0..147 {
                 let root = if number < 144 { 1.0 } else { 4.0 };
                 let error_at = error(frame, number);
@@ -238,7 +238,7 @@ fn the_loss_weighs_frames_by_equation_15_the_root_and_velocities_and_means_over_
                     .checked_sub(1)
                     .map_or(0.0, |before| error(before, number));
                 let change = error_at - before;
-                expected += root * weights[frame] * error_at.powi(2) / 48.0;
+                expected += root * weight * error_at.powi(2) / 48.0;
                 expected += root * 7.0 * change.powi(2) / 48.0;
             }
         }
