@@ -41,6 +41,7 @@ def keydance(arguments, sizes, frames, batch):
 
 def time_sizes(arguments, kind, title, sizes, batch_size):
     """Trains `kind` (a module with `made_up_batch`, `make` and `split`) in these sizes."""
+    torch.compiler.reset()  # functions of other sizes
     fuse = shutil.which("c++") is not None
     threads, batch_size = arguments.threads, arguments.batch or batch_size
     batch, frames = kind.made_up_batch(batch_size, sizes)

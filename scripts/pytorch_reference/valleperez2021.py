@@ -87,13 +87,13 @@ class RelativeBias(nn.Module):
 class Transformer(nn.Module):
     """Linear, post-norm layers, linear."""
 
+    layer = nn.TransformerEncoderLayer
+
     def __init__(self, inputs, outputs, sizes, positions, places):
         super().__init__()
         self.input = nn.Linear(inputs, sizes.width)
         self.layers = nn.ModuleList(
-            nn.TransformerEncoderLayer(
-                sizes.width, sizes.heads, sizes.feed_forward, dropout=0.0, batch_first=True
-            )
+            self.layer(sizes.width, sizes.heads, sizes.feed_forward, dropout=0.0, batch_first=True)
             for _ in range(sizes.layers)
         )
         if positions != "none":
@@ -119,8 +119,35 @@ class Transformer(nn.Module):
         return self.output(x[:, :asking])
 
 
+class FastLayer(nn.TransformerEncoderLayer):
+    """The same numbers, for tokens of which only the first `queries` ask; the bias is not copied."""
+
+    def forward(self, x, queries, bias):
+        own, width = self.self_attn, x.shape[-1]
+        asking = x[:, :queries]
+        if queries == x.shape[1]:
+            projected = functional.linear(x, own.in_proj_weight, own.in_proj_bias).chunk(3, -1)
+        else:
+            weights, biases = own.in_proj_weight, own.in_proj_bias
+            of_asking = functional.linear(asking, weights[:width], biases[:width])
+            of_all = functional.linear(x, weights[width:], biases[width:])
+            projected = (of_asking, *of_all.chunk(2, -1))
+        q, k, v = (it.unflatten(-1, (own.num_heads, -1)).transpose(1, 2) for it in projected)
+        if bias is None:
+            mixed = functional.scaled_dot_product_attention(q, k, v)
+        else:
+            # The fused kernel has no gradient for what is added to the scores.
+            scores = (q * q.shape[-1] ** -0.5) @ k.transpose(-1, -2) + bias
+            mixed = scores.softmax(-1) @ v
+        mixed = own.out_proj(mixed.transpose(1, 2).flatten(2))
+        x = self.norm1(asking + mixed)
+        return self.norm2(x + self.linear2(self.linear1(x).relu()))
+
+
 class FastTransformer(Transformer):
-    """The same numbers: only those that ask are computed in the last layer, biases are not copied."""
+    """The same numbers: in the last layer only those that ask are computed."""
+
+    layer = FastLayer
 
     def forward(self, x, asking):
         tokens = x.shape[1]
@@ -128,31 +155,8 @@ class FastTransformer(Transformer):
         bias = self.bias(tokens)
         for number, layer in enumerate(self.layers):
             queries = asking if number + 1 == len(self.layers) else tokens
-            x = fast_layer(layer, x, queries, None if bias is None else bias[:, :queries])
+            x = layer(x, queries, None if bias is None else bias[:, :queries])
         return self.output(x[:, :asking])
-
-
-def fast_layer(layer, x, queries, bias):
-    """A post-norm layer whose first `queries` tokens ask all."""
-    own, width = layer.self_attn, x.shape[-1]
-    asking = x[:, :queries]
-    if queries == x.shape[1]:
-        projected = functional.linear(x, own.in_proj_weight, own.in_proj_bias).chunk(3, -1)
-    else:
-        weights, biases = own.in_proj_weight, own.in_proj_bias
-        of_asking = functional.linear(asking, weights[:width], biases[:width])
-        of_all = functional.linear(x, weights[width:], biases[width:])
-        projected = (of_asking, *of_all.chunk(2, -1))
-    q, k, v = (it.unflatten(-1, (own.num_heads, -1)).transpose(1, 2) for it in projected)
-    if bias is None and queries == x.shape[1]:
-        mixed = functional.scaled_dot_product_attention(q, k, v)
-    else:
-        # The fused kernel has no gradient for what is added to the scores.
-        scores = (q * q.shape[-1] ** -0.5) @ k.transpose(-1, -2)
-        mixed = (scores if bias is None else scores + bias).softmax(-1) @ v
-    mixed = own.out_proj(mixed.transpose(1, 2).flatten(2))
-    x = layer.norm1(asking + mixed)
-    return layer.norm2(x + layer.linear2(layer.linear1(x).relu()))
 
 
 class Coupling(nn.Module):
@@ -192,6 +196,13 @@ class Block(nn.Module):
         self.linear = flow.PluLinear(setting.motion)
         self.coupling = Coupling(setting, transformer)
 
+    def forward(self, x, h):
+        """y [W, N, D] and the log-determinants of norm, linear layer and coupling."""
+        x, norm = self.norm(x)
+        x, linear = self.linear(x)
+        x, coupling = self.coupling(x, h)
+        return x, norm, linear, coupling
+
     def inverse(self, y, h):
         return self.norm.inverse(self.linear.inverse(self.coupling.inverse(y, h)))
 
@@ -205,9 +216,7 @@ class Flow(nn.Module):
         """x [W, N, D] and the latent h [W, N, width]."""
         norms, linears, couplings = 0, 0, 0
         for block in self.blocks:
-            x, norm = block.norm(x)
-            x, linear = block.linear(x)
-            x, coupling = block.coupling(x, h)
+            x, norm, linear, coupling = block(x, h)
             norms, linears, couplings = norms + norm, linears + linear, couplings + coupling
         return flow.Flowed(x, norms, linears, couplings)
 

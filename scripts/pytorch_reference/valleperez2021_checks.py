@@ -73,6 +73,21 @@ def results(model, batch):
     return found | gradients(model, model(batch))
 
 
+def nearest_kink(model, batch):
+    """The smallest number, by size, that goes into a ReLU."""
+    smallest = []
+
+    def see(_module, _inputs, output):
+        smallest.append(output.detach().abs().min().item())
+
+    layers = [part for name, part in model.named_modules() if name.endswith(".linear1")]
+    hooks = [layer.register_forward_hook(see) for layer in layers]
+    model(batch)
+    for hook in hooks:
+        hook.remove()
+    return min(smallest, default=math.inf)
+
+
 def check(weights, config, batch_path, tolerance=None):
     """keydance's results, in the type of the file, against both versions in f64; 0 if all agree."""
     batch = load_batch(batch_path, [*GIVEN, "windows"])
@@ -85,8 +100,11 @@ def check(weights, config, batch_path, tolerance=None):
         if "target.log_deviations" in batch:
             deviation = load_file(weights)["target.deviation"].double()
             found[version]["target.log_deviations"] = deviation.log().sum().reshape(1)
-    windows = int(batch["windows"].item())
-    print(f"{windows} windows of {setting.predicted_frames} frames, keydance in {theirs_in}")
+    windows, kink = int(batch["windows"].item()), nearest_kink(model, given)
+    print(
+        f"{windows} windows of {setting.predicted_frames} frames, keydance in {theirs_in}; "
+        f"{kink:.1e} goes into a ReLU, nothing nearer 0"
+    )
     return verdict(batch, batch_path, found, tolerance or TOLERANCES[theirs_in])
 
 
@@ -120,9 +138,7 @@ def selftest():
         block = Block(setting, transformer).double()
         block.load_state_dict(weights)
         x, h = (number(example[name]).requires_grad_() for name in ("x", "h"))
-        y, norm = block.norm(x)
-        y, linear = block.linear(y)
-        y, coupling = block.coupling(y, h)
+        y, norm, linear, coupling = block(x, h)
         flowed = flow.Flowed(y, norm, linear, coupling)
         found = gradients(block, flow.losses(flowed))
         found |= {"gradient.x": x.grad, "gradient.h": h.grad, "out": y.detach()}
