@@ -267,6 +267,11 @@ fn likelihoods_tell_own_knowledge_from_that_of_other_windows() {
             ] {
                 assert!(score(key).is_finite() && score(key) != own, "{key}");
             }
+            let [latent, music] = ["bits_foreign_latent", "bits_foreign_music"].map(score);
+            assert_ne!(
+                latent, music,
+                "past motion is known of the other window, too"
+            );
         }
     }
 }

@@ -167,41 +167,64 @@ impl TrainedValleperez {
         Ok(())
     }
 
+    /// Windows of what requests say is known; nothing is to be predicted of them.
+    fn known(&self, requests: &[Request]) -> Result<WindowBatch<f32>, ModelError> {
+        let contexts = &self.reference.contexts;
+        let windows = requests.iter().map(|request| {
+            let given = self.given(request)?;
+            let at = contexts.past();
+            let mut motion = Array2::zeros((contexts.motion + contexts.predicted, self.channels()));
+            let seed = given.motion.slice(s![at - contexts.motion..at, ..]);
+            motion.slice_mut(s![..contexts.motion, ..]).assign(&seed);
+            Ok((motion, given.music_at(contexts.audio_rows(at))))
+        });
+        Ok(self.batch(&windows.collect::<Result<Vec<_>, ModelError>>()?))
+    }
+
     /// Windows of requests with what was recorded in the place of what is asked for.
     fn recorded(
         &self,
         requests: &[Request],
         truths: &[Motion],
     ) -> Result<WindowBatch<f32>, ModelError> {
-        let Reference {
-            features,
-            target,
-            contexts,
-            generation,
-        } = &self.reference;
+        let contexts = &self.reference.contexts;
         let windows = requests.iter().zip(truths).map(|(request, truth)| {
-            request.check(self.name(), &self.needs())?;
-            let given = features.given(request, contexts.past())?;
+            let given = self.given(request)?;
             let at = contexts.past();
-            given.check_music(
-                self.name(),
-                at + contexts.audio_future,
-                generation.pad_audio,
-            )?;
-            let recorded = given.recorded(features, truth, at + contexts.predicted)?;
+            let recorded =
+                given.recorded(&self.reference.features, truth, at + contexts.predicted)?;
             let motion = recorded.slice(s![at - contexts.motion.., ..]).to_owned();
             Ok((motion, given.music_at(contexts.audio_rows(at))))
         });
-        let windows = windows.collect::<Result<Vec<_>, ModelError>>()?;
+        Ok(self.batch(&windows.collect::<Result<Vec<_>, ModelError>>()?))
+    }
+
+    /// A request about one window in the numbers of the network.
+    fn given<'r>(&self, request: &'r Request) -> Result<GivenDance<'r>, ModelError> {
+        let Reference {
+            features,
+            contexts,
+            generation,
+            ..
+        } = &self.reference;
+        request.check(self.name(), &self.needs())?;
+        let given = features.given(request, contexts.past())?;
+        let heard = contexts.past() + contexts.audio_future;
+        given.check_music(self.name(), heard, generation.pad_audio)?;
+        Ok(given)
+    }
+
+    /// D.
+    fn channels(&self) -> usize {
+        self.reference.features.widths().0
+    }
+
+    fn batch(&self, windows: &[(Array2<f32>, Array2<f32>)]) -> WindowBatch<f32> {
         let views = windows
             .iter()
             .map(|(motion, audio)| (motion.view(), audio.view()));
-        Ok(window_batch(
-            target,
-            views,
-            contexts.predicted,
-            windows.len(),
-        ))
+        let predicted = self.reference.contexts.predicted;
+        window_batch(&self.reference.target, views, predicted, windows.len())
     }
 
     /// log p of targets with what the network makes of `known`.
@@ -292,10 +315,7 @@ impl Generator for TrainedValleperez {
         for start in (0..requests.len()).step_by(CHUNK) {
             let end = (start + CHUNK).min(requests.len());
             let batch = self.recorded(&requests[start..end], &truths[start..end])?;
-            let known = match std::ptr::eq(known, requests) {
-                true => batch.clone(),
-                false => self.recorded(&known[start..end], &truths[start..end])?,
-            };
+            let known = self.known(&known[start..end])?;
             densities.extend(self.densities(&known, &batch)?);
         }
         Ok(densities)
