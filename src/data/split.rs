@@ -202,7 +202,7 @@ pub(super) fn lafan1_warning(dataset: &Dataset, config: &DataConfig) -> Option<S
 /// Clips and frames that train, validate and test: of the 43 dances with music at 30 and at 20
 /// frames a second, of the Motorica subset.
 const MUSIC_DANCE: [(usize, usize); 3] = [(32, 60_749), (4, 9_160), (7, 14_341)];
-const MUSIC_DANCE_20: [(usize, usize); 3] = [(32, 40_487), (4, 6_104), (7, 9_558)];
+const MUSIC_DANCE_20: [(usize, usize); 3] = [(32, 40_500), (4, 6_108), (7, 9_560)];
 const MOTORICA: [(usize, usize); 3] = [(4, 6_720), (4, 1_200), (5, 3_653)];
 
 /// Checks clips and frames of a split that a file of the data lists.

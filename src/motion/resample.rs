@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use super::clip::{Clip, Pose};
 
-/// Files round their frame times (0.0333333, 0.00833333): a ratio of rates this close to a whole
-/// number is that number.
+/// Files round their frame times (0.0333333, 0.00833333): a rate, or a ratio of rates, this close to
+/// a whole number is that number.
 const ROUNDING: f64 = 1e-4;
 /// How many new frames one old frame may become.
 const FINEST: f64 = 120.0;
@@ -42,8 +42,8 @@ pub enum ResampleError {
 /// the first frame on up to the last.
 ///
 /// A clip whose frame time rounds 1 / `fps` (0.0333333 s for 30 fps) is returned as it is; where
-/// old and new rate are whole multiples of each other up to such rounding, they are taken to be so
-/// exactly.
+/// the old rate is whole, or old and new rate are whole multiples of each other, up to such
+/// rounding, they are taken to be so exactly.
 ///
 /// # Errors
 /// `fps` is not a positive number, or a frame of the clip would become more than 120 or the clip
@@ -52,7 +52,15 @@ pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
     if !(fps.is_finite() && fps > 0.0) {
         return Err(ResampleError::Rate { fps });
     }
-    let step = whole(1.0 / (fps * clip.frame_time));
+    let step = whole(whole(1.0 / clip.frame_time) / fps);
+    at_step(clip, step, fps)
+}
+
+/// The clip at `fps` frames a second, `step` of its own frames from one to the next.
+///
+/// # Errors
+/// As [`resample`].
+pub(super) fn at_step(clip: Clip, step: f64, fps: f64) -> Result<Clip, ResampleError> {
     if step * FINEST < 1.0 {
         return Err(ResampleError::TooCoarse {
             clip: clip.name,
@@ -82,7 +90,7 @@ pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
     })
 }
 
-/// A ratio of rates, without the rounding of frame times.
+/// A rate or a ratio of rates, without the rounding of frame times.
 fn whole(ratio: f64) -> f64 {
     let snapped = if ratio >= 1.0 {
         ratio.round()

@@ -1,15 +1,15 @@
 //! Clips danced faster or slower.
 
 use super::clip::Clip;
-use super::resample::{ResampleError, resample};
+use super::resample::{ResampleError, at_step};
 
 /// The same dance `tempo` times as fast, at the clip's own frame rate: 2.0 takes half as long.
-/// Poses between frames as in [`resample`].
+/// Poses between frames as in [`resample`](super::resample()).
 ///
 /// # Errors
-/// As [`resample`] at the clip's frame rate divided by `tempo`.
+/// As [`resample`](super::resample()) at the clip's frame rate divided by `tempo`.
 pub fn at_tempo(clip: Clip, tempo: f64) -> Result<Clip, ResampleError> {
     let frame_time = clip.frame_time;
-    let clip = resample(clip, 1.0 / (frame_time * tempo))?;
+    let clip = at_step(clip, tempo, 1.0 / (frame_time * tempo))?;
     Ok(Clip { frame_time, ..clip })
 }

@@ -37,6 +37,14 @@ fn a_rounded_frame_time_counts_as_its_rate() {
 }
 
 #[test]
+fn a_rounded_frame_time_costs_no_frame_where_the_ratio_is_not_whole() {
+    let clip = resample(even(3001, 0.0333333), 20.0).unwrap();
+    assert_eq!(clip.poses.len(), 2001);
+    let last = clip.poses[2000].translations[0].x;
+    assert!((last - 3000.0).abs() < 1e-9, "{last}");
+}
+
+#[test]
 fn any_ratio_keeps_an_even_motion_even() {
     for (frame_time, step, frames) in [
         (1.0 / 24.0, 0.8, 12),

@@ -283,7 +283,7 @@ fn music_dance_at_20_frames_a_second_has_85_numbers_of_music_and_49_of_motion() 
     let made = DanceData::of(&data, &FeaturesConfig::default(), true).unwrap();
     assert_eq!(made.features.widths(), (49, 85));
     let frames = made.train.iter().map(|it| it.frames()).sum::<usize>();
-    assert_eq!((made.train.len(), frames), (64, 2 * 40_487));
+    assert_eq!((made.train.len(), frames), (64, 2 * 40_500));
     let novel = &data.named_frames["novel"];
     for (name, ranges) in novel {
         let all = data.test.iter().chain(&data.validation);
