@@ -11,7 +11,7 @@ from pathlib import Path
 
 import torch
 
-from timing import SHARDED, in_turn, keep_memory, processor, report, seconds
+from timing import in_turn, keep_memory, processor, report, seconds
 from training import OneProcess, Shards
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
@@ -45,16 +45,20 @@ def time_sizes(arguments, kind, title, sizes, batch_size):
     fuse = shutil.which("c++") is not None
     threads, batch_size = arguments.threads, arguments.batch or batch_size
     batch, frames = kind.made_up_batch(batch_size, sizes)
-    versions = {"compiled, threaded products": True}
-    # Beside the others it would not fit the memory.
-    if title not in kind.LARGE:
-        versions = {"plain": False, **versions}
+    # Beside the others the plain version of large sizes would not fit the memory.
+    versions = {"optimised": True} if title in kind.LARGE else {"plain": False, "optimised": True}
     trainers = {
-        name: OneProcess(*kind.make(sizes, fast, fuse)) for name, fast in versions.items()
+        f"{name}, threaded products": OneProcess(*kind.make(sizes, fast, fuse))
+        for name, fast in versions.items()
     }
-    if threads > 1:
-        maker = partial(kind.make, sizes, True, fuse)
-        trainers[SHARDED] = Shards(maker, partial(kind.split, sizes), threads, fuse)
+    shards = {
+        f"{name}, processes": Shards(
+            partial(kind.make, sizes, fast, fuse), partial(kind.split, sizes), threads, fuse
+        )
+        for name, fast in versions.items()
+        if threads > 1
+    }
+    trainers |= shards
     work, runs = batch_size * frames, {}
     for name, trainer in trainers.items():
         start = time.perf_counter()
@@ -65,8 +69,8 @@ def time_sizes(arguments, kind, title, sizes, batch_size):
     if arguments.keydance:
         runs["keydance"] = lambda: keydance(arguments, sizes, frames, batch_size)
     best = in_turn(runs, arguments.rounds)
-    if SHARDED in trainers:
-        trainers[SHARDED].close()
+    for trainer in shards.values():
+        trainer.close()
     plural = "s" if threads > 1 else ""
     title = f"{arguments.model}, {title}, {frames} frames, batch {batch_size}, {threads} thread{plural}"
     report(f"training step of {title}", "frame-steps/s", best)

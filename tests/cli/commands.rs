@@ -171,6 +171,47 @@ fn an_exported_batch_holds_windows_outputs_losses_and_the_gradient_of_every_weig
 }
 
 #[test]
+fn a_training_step_of_every_kind_of_model_is_timed() {
+    for (config, frames, sizes) in [
+        ("li2023/ours", "12", "model.layers=1"),
+        (
+            "pu2022/small",
+            "62",
+            "model.cross_layers=1 model.music_layers=1 schedule.key_poses=1",
+        ),
+        (
+            "valleperez2021/transflower",
+            "12",
+            "model.cross_layers=1 model.width=40 model.blocks=1",
+        ),
+        (
+            "valleperez2021/deterministic",
+            "12",
+            "model.cross_layers=1 model.width=40",
+        ),
+        (
+            "valleperez2021/moglow",
+            "12",
+            "model.blocks=1 model.hidden=16",
+        ),
+    ] {
+        let folder = env!("CARGO_MANIFEST_DIR");
+        let file = format!("{folder}/experiments/{config}.toml");
+        let mut arguments = vec!["bench-step", &file, "--batch", "1", "--frames", frames];
+        arguments.extend(["--repetitions", "1", "--threads", "1", "--json"]);
+        for size in sizes.split(' ') {
+            arguments.extend(["--set", size]);
+        }
+        let output = run(&arguments);
+        let error = stderr(&output);
+        assert!(output.status.success(), "{config}: {error}");
+        let json: Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let speed = json["frame_steps_per_second"].as_f64().unwrap();
+        assert!(speed > 0.0, "{config}");
+    }
+}
+
+#[test]
 fn timings_are_printed_as_a_line_of_text_or_json() {
     let once = ["--repetitions", "1", "--threads", "1"];
     for (command, size, key) in [

@@ -35,7 +35,10 @@ pub fn made_up(contexts: Contexts, batch: usize, seed: u64) -> Result<MadeUp, Mo
     let dances = by_name(dances.map_err(|error| ModelError::data(&error))?);
     let data = DataConfig {
         fps: FPS,
-        split: Split::Share(1.0),
+        split: Split::List {
+            train: dances.keys().cloned().collect(),
+            test: Vec::new(),
+        },
         music: true,
         ..DataConfig::default()
     };
