@@ -28,7 +28,7 @@ const MISSED: u8 = 4;
 ///
 /// No data needed, the same numbers each time. Of Pan et al. (pan2021), two to three minutes on two
 /// cores: the model is to be ahead in LRP at 100 and 150 frames, of interpolation and of the linear
-/// estimate that it was before its training. Of Pu and Shan (pu2022), with music, five minutes: its
+/// estimate that it was before its training. Of Pu and Shan (pu2022), with music, six minutes: its
 /// consistency error is to be below half of a held pose's, and its beats to hit those of the music
 /// more often than by chance (97.5 % of 200 shifts of the beats). Of Valle-Pérez et al.
 /// (valleperez2021), with music, three minutes: no dance is to freeze or diverge, the mean step to

@@ -1,5 +1,5 @@
-//! `keydance demo --reduced` through the binary: every result is written, and the model is ahead of
-//! what needs no training.
+//! `keydance demo --reduced` through the binary: every result is written, and it says whether the
+//! goal is reached.
 
 use std::fs;
 use std::path::Path;
@@ -8,6 +8,7 @@ use assert_cmd::Command;
 use keydance::evaluation::{ProtocolScores, ScoreRow, Scores};
 use keydance::motion::bvh;
 use keydance::report::demo::pan2021::Comparison;
+use keydance::report::demo::pu2022::Goal;
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
@@ -127,4 +128,50 @@ fn ahead_is_ahead_at_every_long_transition() {
     assert!(!ahead([69.9, 78.0]));
     assert!(!ahead([70.1, 10.0]));
     assert!(!ahead([f64::NAN, 10.0]));
+}
+
+#[test]
+fn a_demo_to_music_writes_every_result_and_says_that_a_model_hardly_trained_misses_its_goal() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    let mut demo = demo(&out);
+    demo.args(["--paper", "pu2022", "--fraction", "0.001"]);
+    demo.assert()
+        .code(4)
+        .stdout(contains("consistency error").and(contains("with shifted beats at most")))
+        .stderr(contains("does not keep to its key poses"));
+    for row in ["evaluation.json", "hold.json", "interpolation.json"] {
+        let scores = &json(&out.join(row))["music_dance"];
+        assert!(scores["consistency"]["all"].is_number(), "{row}");
+        assert!(scores["beat_hit_rate_shifted"]["3"].is_number(), "{row}");
+    }
+    let [dance, recorded] =
+        ["dance.bvh", "recorded.bvh"].map(|name| bvh::read(&out.join(name)).unwrap().to_clip());
+    assert_eq!(dance.poses.len(), recorded.poses.len());
+    for file in ["song.wav", "viewer.html", "tables.md", "loss_curve.svg"] {
+        assert!(fs::metadata(out.join(file)).unwrap().len() > 0, "{file}");
+    }
+}
+
+#[test]
+fn both_key_poses_and_beats_are_to_be_kept_to() {
+    let scores = |consistency: f64, hits: f64, by_chance: f64| {
+        let rows = [
+            ("consistency", ScoreRow::new([("all", consistency)])),
+            ("beat_hit_rate", ScoreRow::new([("3", hits)])),
+            ("beat_hit_rate_shifted", ScoreRow::new([("3", by_chance)])),
+        ];
+        let scores = Scores::new(rows, [("all", 1), ("3", 1)]);
+        ProtocolScores::new([("music_dance", scores)])
+    };
+    let reached = |consistency, hits, by_chance| {
+        let held = scores(5.0, 2.0, 3.0);
+        Goal::of(&scores(consistency, hits, by_chance), &held).is_reached()
+    };
+    assert!(reached(2.4, 50.1, 50.0));
+    assert!(!reached(2.5, 50.1, 50.0));
+    assert!(!reached(2.4, 50.0, 50.0));
+    assert!(!reached(f64::NAN, 50.1, 50.0));
+    let nothing = ProtocolScores::default();
+    assert!(!Goal::of(&nothing, &nothing).is_reached());
 }

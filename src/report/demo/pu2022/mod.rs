@@ -5,22 +5,19 @@ mod showcase;
 
 pub use goal::Goal;
 
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
-
-use rayon::prelude::*;
 
 use super::{Demo, DemoOptions, Other, OtherScores, Verdict};
-use crate::data::choreography::{ChoreographyConfig, DanceWithMusic, generate_with_music};
-use crate::data::{DataError, Dataset};
+use crate::data::Dataset;
+use crate::data::choreography::{
+    ChoreographyConfig, by_name, clips_with_music, dataset_with_music, generate_with_music,
+};
 use crate::evaluation::ProtocolScores;
 use crate::experiment::ExperimentConfig;
 use crate::models::Generator;
 use crate::models::baselines::rotations::RotationBaseline;
 use crate::models::pu2022::Pu2022Settings;
 use crate::models::settings::ValueError;
-use crate::music::{Analysis, RATE, Sound};
 use crate::report::{NO_TRAINING, ReportError};
 
 const EXPERIMENT: &str = include_str!("../../../../experiments/demo_pu2022.toml");
@@ -47,7 +44,7 @@ pub fn open(options: &DemoOptions) -> Result<Box<dyn Demo>, ReportError> {
     let (clips, frames_per_clip) = if options.reduced {
         (12, 450)
     } else {
-        (24, 900)
+        (200, 900)
     };
     let fraction = options.fraction.or(options.reduced.then_some(0.1));
     let fraction = fraction.unwrap_or(1.0);
@@ -69,14 +66,6 @@ pub fn open(options: &DemoOptions) -> Result<Box<dyn Demo>, ReportError> {
     }))
 }
 
-impl Pu2022Demo {
-    fn dances(&self) -> Result<BTreeMap<String, DanceWithMusic>, ReportError> {
-        let dances = generate_with_music(&self.choreography)?.into_iter();
-        let named = dances.map(|dance| (dance.dance.clip.name.clone(), dance));
-        Ok(named.collect())
-    }
-}
-
 impl Demo for Pu2022Demo {
     fn choreography(&self) -> &ChoreographyConfig {
         &self.choreography
@@ -91,23 +80,8 @@ impl Demo for Pu2022Demo {
     }
 
     fn dataset(&self) -> Result<Dataset, ReportError> {
-        let dances = self.dances()?;
-        let clips = dances.values().map(|it| it.dance.clip.clone()).collect();
-        let mut dataset = Dataset::from_clips(clips, &self.experiment.data)?;
-        let Dataset {
-            train,
-            validation,
-            test,
-            ..
-        } = &mut dataset;
-        let recordings = train.par_iter_mut().chain(validation).chain(test);
-        recordings.try_for_each(|recording| {
-            let samples = dances.get(recording.name()).map(|it| &it.samples);
-            let sound = Sound::new(recording.name(), samples.map_or(&[], |it| it), RATE)?;
-            recording.music = Some(Arc::new(Analysis::of(&sound)?));
-            Ok::<(), DataError>(())
-        })?;
-        Ok(dataset)
+        let dances = by_name(generate_with_music(&self.choreography)?);
+        Ok(dataset_with_music(&dances, &self.experiment.data)?)
     }
 
     fn others(&self, _untrained: Box<dyn Generator>) -> Vec<Other> {
@@ -151,9 +125,9 @@ impl Demo for Pu2022Demo {
         dataset: &Dataset,
         folder: &Path,
     ) -> Result<String, ReportError> {
-        let mut dances = self.dances()?;
         let first = dataset.test.first();
-        let recorded = first.and_then(|first| dances.remove(first.name()));
+        let mut dances = clips_with_music(&self.choreography)?;
+        let recorded = first.and_then(|first| dances.find(|it| it.dance.clip.name == first.name()));
         let none = || ReportError::Refused("there is no test clip to show".into());
         showcase::write(&recorded.ok_or_else(none)?, model, &self.experiment, folder)
     }
