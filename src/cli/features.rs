@@ -20,7 +20,8 @@ pub struct FeaturesArgs {
     /// Where to write the array: float32, [frames, 154], not standardised
     #[arg(long, value_name = "FILE")]
     npy: PathBuf,
-    /// Mapping file for a skeleton other than the dance skeleton
+    /// Mapping file for a skeleton other than the dance skeleton [default: the joints are
+    /// recognised]
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
     #[command(flatten)]
@@ -39,7 +40,8 @@ pub fn run(args: FeaturesArgs) -> anyhow::Result<()> {
     let mapping = args.mapping.as_deref().map(Mapping::read).transpose()?;
     let clip = bvh::read(&args.file)?.to_clip();
     let data = args.units.over(&DataConfig::default());
-    let (measured, notices) = DanceClip::from_file(clip, mapping.as_ref(), &data)?;
+    let mapping = Mapping::onto_dance_skeleton(&clip, mapping.as_ref())?;
+    let (measured, notices) = DanceClip::from_file(clip, mapping.as_deref(), &data)?;
     warn(&notices);
     let array = measured.features.mapv(|value| value as f32);
     let mut file = Vec::new();

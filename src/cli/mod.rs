@@ -12,11 +12,13 @@ mod file_units;
 mod generate;
 mod gradcheck;
 mod list;
+mod manual;
 mod music;
 mod notice;
 mod progress;
 mod regenerate;
 mod reproduce;
+mod rig;
 mod runs;
 mod stop;
 mod study;
@@ -79,6 +81,8 @@ enum Command {
     Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/runs.txt"))]
     Runs(runs::RunsArgs),
+    #[command(after_help = include_str!("help/rig.txt"))]
+    Rig(rig::RigArgs),
     /// Look into BVH files
     #[command(after_help = include_str!("help/bvh.txt"))]
     Bvh(bvh::BvhArgs),
@@ -96,6 +100,10 @@ enum Command {
     /// Write a batch with a trained model's outputs, losses and gradients
     #[command(after_help = include_str!("help/export_batch.txt"))]
     ExportBatch(export_batch::ExportBatchArgs),
+    #[command(after_help = include_str!("help/completions.txt"))]
+    Completions(manual::CompletionsArgs),
+    #[command(after_help = include_str!("help/man.txt"))]
+    Man(manual::ManArgs),
     /// Time a training step
     #[command(after_help = include_str!("help/bench_step.txt"))]
     BenchStep(bench::StepArgs),
@@ -126,11 +134,14 @@ impl Cli {
             Command::Runs(args) => runs::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Choreography(args) => choreography::run(args)?,
+            Command::Rig(args) => rig::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,
             Command::Music(args) => music::run(args)?,
             Command::Gradcheck(args) => gradcheck::run(args)?,
             Command::ExportBatch(args) => export_batch::run(args)?,
+            Command::Completions(args) => manual::completions(&args)?,
+            Command::Man(args) => manual::man(&args)?,
             Command::BenchStep(args) => bench::step(args)?,
             Command::BenchLayers(args) => bench::layers(args)?,
             Command::BenchGenerate(args) => bench::generate(args)?,

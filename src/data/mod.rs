@@ -29,5 +29,5 @@ pub use pairs::music_beside;
 #[cfg(feature = "papers")]
 pub(crate) use pairs::{sound_files, sound_of};
 pub use part::{DataPart, EmptyPart};
-pub use reading::FileReading;
+pub use reading::{FileReading, RigReading, at_its_rate};
 pub use windows::{Window, WindowCut};

@@ -7,7 +7,7 @@ use crate::counted::counted;
 use crate::motion::frame_rate::meant_rate;
 use crate::motion::oddities::oddities;
 use crate::motion::units::to_cm_and_y_up;
-use crate::motion::{Clip, Mapping, Unit, Up};
+use crate::motion::{Clip, Conversion, Mapping, Unit, Up, resample};
 
 /// How many clips a warning names.
 const NAMED: usize = 3;
@@ -29,13 +29,11 @@ impl FileReading {
     /// The clip cannot be resampled or mapped, has too few frames, or the config declares what the
     /// mapping declares otherwise.
     pub fn of(
-        mut clip: Clip,
+        clip: Clip,
         mapping: Option<&Mapping>,
         config: &DataConfig,
     ) -> Result<Self, DataError> {
-        let mut notices = Vec::new();
-        notices.extend(set_rate(&mut clip, config.source_fps)?);
-        skip_frames(&mut clip, config.skip_frames)?;
+        let (clip, mut notices) = at_its_rate(clip, config)?;
         notices.extend(oddities(&clip));
         let Recording { mut clip, .. } = Recording::new(clip, mapping, config)?;
         // What the mapping declares has been applied with it.
@@ -49,6 +47,52 @@ impl FileReading {
             notices,
         })
     }
+}
+
+/// A rig's own clip, as its file has it but for rate, first frames, unit and axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigReading {
+    /// In cm, with Y up, at the config's rate: frame by frame what a [`FileReading`] with the
+    /// mapping has on the dance skeleton.
+    pub clip: Clip,
+    /// How it was brought there.
+    pub conversion: Conversion,
+}
+
+impl RigReading {
+    /// The rig's side of what [`FileReading::of`] reads.
+    ///
+    /// # Errors
+    /// As [`FileReading::of`].
+    pub fn of(clip: Clip, mapping: &Mapping, config: &DataConfig) -> Result<Self, DataError> {
+        let (clip, _) = at_its_rate(clip, config)?;
+        let mut clip = resample(clip, config.fps)?;
+        undeclared(mapping, config)?;
+        let up = match mapping.up() {
+            Up::Auto => config.up,
+            declared => declared,
+        };
+        let unit = match mapping.scale() {
+            Some(_) => Unit::Cm,
+            None => config.unit,
+        };
+        let mapped = mapping.without_units().apply(&clip)?;
+        let (mut conversion, _) = Conversion::of(&mapped, unit, up);
+        conversion.cm *= mapping.scale().unwrap_or(1.0);
+        conversion.apply(&mut clip);
+        Ok(Self { clip, conversion })
+    }
+}
+
+/// A clip with the frame time that is declared or that its own one means, without the first frames
+/// that the config leaves out; and a notice of such a rate.
+///
+/// # Errors
+/// The declared rate is none, or the clip has too few frames.
+pub fn at_its_rate(mut clip: Clip, config: &DataConfig) -> Result<(Clip, Vec<String>), DataError> {
+    let notice = set_rate(&mut clip, config.source_fps)?;
+    skip_frames(&mut clip, config.skip_frames)?;
+    Ok((clip, notice.into_iter().collect()))
 }
 
 /// Gives a clip the declared rate, or the one that its frame time rounds.

@@ -9,6 +9,7 @@
 //! Spine1 = { between = ["abdomen", "chest"], at = 0.5 }   # a point on the way from one to another
 //! ```
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::clip::{Clip, Pose};
+use super::rig::Recognised;
 use super::skeleton::{DANCE_JOINTS, DANCE_PARENTS, Joint, Skeleton};
 use super::units::{Unit, Up, turn_z_up};
 
@@ -39,6 +41,18 @@ pub enum MappingError {
     UnknownJoint { file: String, joint: String },
     #[error("{file}: [joints] lacks {joints}; all 24 joints of the dance skeleton need an entry")]
     Incomplete { file: String, joints: String },
+    #[error(
+        "{clip}: joint {} is {}, the dance skeleton has {} there, and as a rig it was not \
+         recognised: no {}; keydance rig {clip} --out mapping.toml begins a mapping file to edit",
+        difference.0, difference.2, difference.1,
+        missing.join(", ")
+    )]
+    Unrecognised {
+        clip: String,
+        /// The first joint that is another, what the dance skeleton has there, what the rig has.
+        difference: (usize, String, String),
+        missing: Vec<&'static str>,
+    },
     #[error("{file}: {key} = {value}: expected {expected}")]
     Value {
         file: String,
@@ -115,6 +129,18 @@ enum Source {
 struct Between {
     between: [String; 2],
     at: f64,
+}
+
+impl Source {
+    /// How near a joint is to it: 2 at it, up to 1 where it lies between this and another, else 0.
+    fn share_of(&self, joint: &Joint) -> f64 {
+        match self {
+            Self::At(name) if *name == joint.name => 2.0,
+            Self::Between(Between { between, at }) if between[0] == joint.name => 1.0 - at,
+            Self::Between(Between { between, at }) if between[1] == joint.name => *at,
+            _ => 0.0,
+        }
+    }
 }
 
 /// A place on a skeleton that moves with one of its joints.
@@ -213,6 +239,49 @@ impl Mapping {
         })
     }
 
+    /// What brings a clip onto the dance skeleton: nothing where it is on it, else the mapping that
+    /// is given, else what is recognised.
+    ///
+    /// # Errors
+    /// As [`Mapping::recognised`].
+    pub fn onto_dance_skeleton<'m>(
+        clip: &Clip,
+        given: Option<&'m Self>,
+    ) -> Result<Option<Cow<'m, Self>>, MappingError> {
+        Ok(match given {
+            _ if clip.skeleton.is_dance_skeleton() => None,
+            Some(mapping) => Some(Cow::Borrowed(mapping)),
+            None => Some(Cow::Owned(Self::recognised(clip)?)),
+        })
+    }
+
+    /// The mapping of a rig whose joints are recognised by their names and places; unit and axis
+    /// are not declared.
+    ///
+    /// # Errors
+    /// A joint of the dance skeleton was not found on it.
+    pub fn recognised(clip: &Clip) -> Result<Self, MappingError> {
+        let found = Recognised::of(&clip.skeleton);
+        let missing = found.missing();
+        if let Some(difference) = clip.skeleton.difference_from_dance()
+            && !missing.is_empty()
+        {
+            return Err(MappingError::Unrecognised {
+                clip: clip.name.clone(),
+                difference,
+                missing,
+            });
+        }
+        let sources = found.sources.into_iter().flatten();
+        Ok(Self {
+            file: format!("what was recognised of {}", clip.name),
+            scale: 1.0,
+            has_unit: false,
+            up: Up::Auto,
+            sources: sources.map(Source::At).collect(),
+        })
+    }
+
     /// Whether the file declares the clips' unit, by `scale` or `unit`.
     pub fn has_unit(&self) -> bool {
         self.has_unit
@@ -231,6 +300,47 @@ impl Mapping {
     /// Whether the file declares nothing about clips but their joints.
     pub fn keeps_units(&self) -> bool {
         !self.has_unit && !self.has_up()
+    }
+
+    /// cm per unit of the other skeleton, where the file declares it.
+    pub fn scale(&self) -> Option<f64> {
+        self.has_unit.then_some(self.scale)
+    }
+
+    /// The upward axis that the file declares.
+    pub fn up(&self) -> Up {
+        self.up
+    }
+
+    /// The same joints without what the file declares of unit and axis.
+    pub fn without_units(&self) -> Self {
+        Self {
+            scale: 1.0,
+            has_unit: false,
+            up: Up::Auto,
+            ..self.clone()
+        }
+    }
+
+    /// For each joint of a rig the joint of the dance skeleton whose rotation it has, `[joints]`:
+    /// of several at its place the last, which carries what hangs on them; for a joint that points
+    /// lie between, the nearest of these; none for a joint that the mapping does not name.
+    pub fn turned_as(&self, rig: &Skeleton) -> Vec<Option<usize>> {
+        let turned_as = |joint: &Joint| {
+            let shares = self.sources.iter().map(|source| source.share_of(joint));
+            let shares = shares.enumerate();
+            let nearest = shares.max_by(|a, b| a.1.total_cmp(&b.1));
+            nearest.filter(|(_, share)| *share > 0.0).map(|(at, _)| at)
+        };
+        rig.joints.iter().map(turned_as).collect()
+    }
+
+    /// The joint of a rig that stands for the hips, or is next to them.
+    pub fn hips(&self, rig: &Skeleton) -> Option<usize> {
+        let hips = self.sources.first()?;
+        let shares = rig.joints.iter().map(|joint| hips.share_of(joint));
+        let nearest = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.filter(|(_, share)| *share > 0.0).map(|(at, _)| at)
     }
 
     /// For each joint of another skeleton the joint of the dance skeleton that stands at its place,

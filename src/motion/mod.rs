@@ -19,6 +19,7 @@ pub mod mirror;
 pub mod oddities;
 pub mod placement;
 pub mod resample;
+pub mod rig;
 pub mod root_reconstruction;
 pub mod rotation_6d;
 pub mod rotation_fit;
@@ -35,9 +36,10 @@ pub use features::{FeatureConfig, FeatureError, features};
 pub use mapping::{Mapping, MappingError};
 pub use mirror::mirror_image;
 pub use resample::{ResampleError, resample};
+pub use rig::Recognised;
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
 pub use tempo::at_tempo;
-pub use units::{Measured, Unit, Up};
+pub use units::{Conversion, Measured, Unit, Up};
 pub use velocity_factor::{
     PART_NAMES, PART_WEIGHTS, PARTS, measured_velocity_factors, velocity_factors,
     velocity_factors_between,

@@ -1,6 +1,7 @@
 //! Units and axes of clips from other programs: recognised by the body, converted to centimetres
 //! with Y up.
 
+use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -140,41 +141,84 @@ impl Measured {
     }
 }
 
-/// Brings a clip from the unit and axis that are declared, or else recognised, to cm and Y up. Says
-/// what was recognised and done; nothing of a clip that is in cm and Y up, which stays as it is.
+/// How a clip is brought to cm and Y up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conversion {
+    /// cm in one of its units.
+    pub cm: f64,
+    turn: Turn,
+}
+
+/// What is turned from Z up to Y up: the axes become (x, z, -y).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    Nothing,
+    /// Where the rest pose stands along Y already, it is the root that carries the motion's axes,
+    /// and it alone is turned.
+    Root,
+    /// Offsets, translations and rotations, so that the rest pose stands, too.
+    Whole,
+}
+
+impl Conversion {
+    /// What the unit and axis that are declared, or else recognised, ask for; and what was
+    /// recognised and is done: nothing of a clip that is in cm and Y up, which stays as it is.
+    pub fn of(clip: &Clip, unit: Unit, up: Up) -> (Self, Vec<String>) {
+        let mut notices = Vec::new();
+        let measured = match (unit, up) {
+            (Unit::Auto, _) | (_, Up::Auto) => Measured::of(clip),
+            _ => Measured::default(),
+        };
+        if unit == Unit::Auto
+            && let Some(height) = measured.height
+            && measured.unit != Some(Unit::Cm)
+        {
+            notices.push(match measured.unit {
+                Some(unit) => format!(
+                    "the body is {} units tall: taken as {unit} and converted to cm; another unit can be declared",
+                    rounded(height)
+                ),
+                None => format!(
+                    "the body is {} units tall, which is a grown-up in none of cm, m, mm and in: taken as cm; the unit can be declared",
+                    rounded(height)
+                ),
+            });
+        }
+        if up == Up::Auto && measured.up == Some(Up::Z) {
+            let done =
+                "the body stands along Z: turned so that Y is up; another axis can be declared";
+            notices.push(done.into());
+        }
+        let unit = match unit {
+            Unit::Auto => measured.unit.unwrap_or_default(),
+            declared => declared,
+        };
+        let turn = if up == Up::Z || up == Up::Auto && measured.up == Some(Up::Z) {
+            Turn::of(&clip.skeleton)
+        } else {
+            Turn::Nothing
+        };
+        let cm = unit.cm();
+        (Self { cm, turn }, notices)
+    }
+
+    /// Brings a clip to cm and Y up.
+    pub fn apply(self, clip: &mut Clip) {
+        scale(clip, self.cm);
+        self.turn.apply(clip, &TO_Y_UP);
+    }
+
+    /// Brings a clip that is in cm with Y up back.
+    pub fn undo(self, clip: &mut Clip) {
+        self.turn.apply(clip, &TO_Z_UP);
+        scale(clip, 1.0 / self.cm);
+    }
+}
+
+/// Brings a clip to cm and Y up, see [`Conversion::of`].
 pub fn to_cm_and_y_up(clip: &mut Clip, unit: Unit, up: Up) -> Vec<String> {
-    let mut notices = Vec::new();
-    let measured = match (unit, up) {
-        (Unit::Auto, _) | (_, Up::Auto) => Measured::of(clip),
-        _ => Measured::default(),
-    };
-    if unit == Unit::Auto
-        && let Some(height) = measured.height
-        && measured.unit != Some(Unit::Cm)
-    {
-        notices.push(match measured.unit {
-            Some(unit) => format!(
-                "the body is {} units tall: taken as {unit} and converted to cm; another unit can be declared",
-                rounded(height)
-            ),
-            None => format!(
-                "the body is {} units tall, which is a grown-up in none of cm, m, mm and in: taken as cm; the unit can be declared",
-                rounded(height)
-            ),
-        });
-    }
-    if up == Up::Auto && measured.up == Some(Up::Z) {
-        let done = "the body stands along Z: turned so that Y is up; another axis can be declared";
-        notices.push(done.into());
-    }
-    let unit = match unit {
-        Unit::Auto => measured.unit.unwrap_or_default(),
-        declared => declared,
-    };
-    scale(clip, unit.cm());
-    if up == Up::Z || up == Up::Auto && measured.up == Some(Up::Z) {
-        turn_z_up(clip);
-    }
+    let (conversion, notices) = Conversion::of(clip, unit, up);
+    conversion.apply(clip);
     notices
 }
 
@@ -200,27 +244,64 @@ fn scale(clip: &mut Clip, factor: f64) {
     }
 }
 
-/// Turns a clip from Z up to Y up: its axes become (x, z, -y).
-///
-/// Offsets, translations and rotations are turned whole, so that the rest pose stands, too. Where
-/// the rest pose stands along Y already, it is the root that carries the motion's axes, and it
-/// alone is turned.
+/// Turns a clip from Z up to Y up.
 pub(super) fn turn_z_up(clip: &mut Clip) {
-    let rest = clip.skeleton.rest_pose();
-    let stands = |body: Body| body.rises(&clip.skeleton, &rest).y > STANDS;
-    if Body::of(&clip.skeleton).is_some_and(stands) {
-        let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
-        for (index, joint) in clip.skeleton.joints.iter().enumerate() {
-            if joint.parent.is_some() {
-                continue;
-            }
-            for pose in &mut clip.poses {
-                pose.translations[index] = turned(pose.translations[index]);
-                pose.rotations[index] = (turn * pose.rotations[index]).normalize();
-            }
+    Turn::of(&clip.skeleton).apply(clip, &TO_Y_UP);
+}
+
+impl Turn {
+    /// What a skeleton of a clip with Z up asks for.
+    fn of(skeleton: &Skeleton) -> Self {
+        let rest = skeleton.rest_pose();
+        let stands = |body: Body| body.rises(skeleton, &rest).y > STANDS;
+        match Body::of(skeleton).is_some_and(stands) {
+            true => Self::Root,
+            false => Self::Whole,
         }
-        return;
     }
+
+    fn apply(self, clip: &mut Clip, way: &Quarter) {
+        match self {
+            Self::Nothing => {}
+            Self::Root => turn_roots(clip, way),
+            Self::Whole => turn_whole(clip, way),
+        }
+    }
+}
+
+/// A quarter of a turn about X.
+struct Quarter {
+    /// rad.
+    angle: f64,
+    /// The same without rounding.
+    turned: fn(DVec3) -> DVec3,
+}
+
+// 0 - y, for no -0 where y is 0.
+const TO_Y_UP: Quarter = Quarter {
+    angle: -FRAC_PI_2,
+    turned: |vector| DVec3::new(vector.x, vector.z, 0.0 - vector.y),
+};
+const TO_Z_UP: Quarter = Quarter {
+    angle: FRAC_PI_2,
+    turned: |vector| DVec3::new(vector.x, 0.0 - vector.z, vector.y),
+};
+
+fn turn_roots(clip: &mut Clip, way: &Quarter) {
+    let (turn, turned) = (DQuat::from_rotation_x(way.angle), way.turned);
+    for (index, joint) in clip.skeleton.joints.iter().enumerate() {
+        if joint.parent.is_some() {
+            continue;
+        }
+        for pose in &mut clip.poses {
+            pose.translations[index] = turned(pose.translations[index]);
+            pose.rotations[index] = (turn * pose.rotations[index]).normalize();
+        }
+    }
+}
+
+fn turn_whole(clip: &mut Clip, way: &Quarter) {
+    let turned = way.turned;
     for joint in &mut clip.skeleton.joints {
         joint.offset = turned(joint.offset);
         for end in &mut joint.end_sites {
@@ -236,11 +317,6 @@ pub(super) fn turn_z_up(clip: &mut Clip) {
             *rotation = DQuat::from_xyzw(axis.x, axis.y, axis.z, rotation.w);
         }
     }
-}
-
-fn turned(vector: DVec3) -> DVec3 {
-    // 0 - y, for no -0 where y is 0.
-    DVec3::new(vector.x, vector.z, 0.0 - vector.y)
 }
 
 fn unit_of(height: f64) -> Option<Unit> {

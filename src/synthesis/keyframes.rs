@@ -6,13 +6,21 @@ use std::str::FromStr;
 
 use ndarray::{Array2, ArrayView2, s};
 
+use super::own_frames::OnWholeFrames;
+use super::own_rig::OwnRig;
 use super::{KeyframeSource, SequenceRequest, SynthesisError};
 use crate::counted::counted;
-use crate::data::{DataConfig, DataError};
+use crate::data::{DataConfig, DataError, at_its_rate};
 use crate::models::transition::DanceClip;
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
+use crate::motion::rig::{RigKeyframe, retime, spread};
 use crate::motion::{Clip, Mapping, MappingError};
+
+/// Channels of a joint that has none of its own.
+const ORDER: [Axis; 3] = [Axis::Z, Axis::X, Axis::Y];
+/// Rates within this of each other, as a share, are the same.
+const SAME_RATE: f64 = 1e-4;
 
 /// Frames of a result at most: an hour at 30 a second.
 pub const LONGEST: u32 = 108_000;
@@ -116,6 +124,8 @@ pub struct KeyframeChoice {
     pub further: Vec<FileKeyframe>,
     /// For clips on another skeleton than the dance skeleton, in place of the data's.
     pub mapping: Option<PathBuf>,
+    /// The dancer's frames, and the lengths between them, count at its file's own rate.
+    pub own_frames: bool,
 }
 
 impl KeyframeChoice {
@@ -325,11 +335,22 @@ pub(super) fn lengthened(
     }
 }
 
+fn unusable(path: &Path) -> impl Fn(DataError) -> KeyframeError {
+    move |source| KeyframeError::Clip {
+        file: path.into(),
+        source: source.into(),
+    }
+}
+
 /// A file that was read.
 struct Source {
     clip: DanceClip,
     /// The file's channels, where it is on the dance skeleton and every joint turns.
     channels: Option<Vec<Vec<Channel>>>,
+    /// The file's own rig, where it is not the dance skeleton.
+    rig: Option<OwnRig>,
+    /// Seconds from one frame of the file to the next.
+    frame_time: f64,
 }
 
 /// The keyframes of a result with the files that they come from.
@@ -341,16 +362,27 @@ pub struct Keyframes {
     motion: Option<(PathBuf, usize)>,
     mapping: Option<Mapping>,
     data: DataConfig,
+    /// Frames from each keyframe to the next, where they are to be others than the clip's.
+    lengths: Vec<u32>,
+    /// When the keyframes are, in frames of the dancer's file, where these count.
+    own_times: Option<Vec<usize>>,
     notices: Vec<String>,
 }
 
 impl Keyframes {
     /// Reads the files of a choice, in the unit, axis and rate of `data`; frames count from the
-    /// first of a file, also where `data` leaves first frames out.
+    /// first of a file, also where `data` leaves first frames out. `lengths`: frames from each
+    /// keyframe of the dancer's clip to the next, none for their own distances, one for all, or one
+    /// for each.
     ///
     /// # Errors
-    /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton.
-    pub fn read(choice: &KeyframeChoice, data: &DataConfig) -> Result<Self, KeyframeError> {
+    /// No keyframes, keyframes out of order, a file that cannot be read or is on another skeleton,
+    /// lengths that do not fit.
+    pub fn read(
+        choice: &KeyframeChoice,
+        lengths: &[u32],
+        data: &DataConfig,
+    ) -> Result<Self, KeyframeError> {
         let TimedKeyframes { keyframes, motion } = TimedKeyframes::of(choice)?;
         let mapping = match &choice.mapping {
             Some(path) => Some(Mapping::read(path)?),
@@ -365,8 +397,13 @@ impl Keyframes {
                 skip_frames: 0,
                 ..data.clone()
             },
+            lengths: lengths.to_vec(),
+            own_times: None,
             notices: Vec::new(),
         };
+        if choice.own_frames {
+            read.read_own_frames()?;
+        }
         for keyframe in read.keyframes.clone() {
             if !read.sources.contains_key(&keyframe.file) {
                 let (source, notices) = read.source(&keyframe.file)?;
@@ -382,20 +419,80 @@ impl Keyframes {
         &self.notices
     }
 
+    /// Reads the dancer's file with its keyframes as whole frames.
+    fn read_own_frames(&mut self) -> Result<(), KeyframeError> {
+        let Some((path, first)) = self.motion.clone() else {
+            return Ok(());
+        };
+        let document = bvh::read(&path)?;
+        let (clip, notices) = self.at_its_rate(&path, document.to_clip())?;
+        let frame_time = clip.frame_time;
+        let rows: Vec<usize> = self.keyframes.iter().map(|it| it.frame).collect();
+        let own_times = lengthened(&self.lengths, rows.len())?;
+        if own_times.is_some() {
+            // What is between poses that are put elsewhere in time is no recording.
+            self.motion = None;
+            self.lengths.clear();
+        }
+        let made = OnWholeFrames::of(clip, &rows, own_times, self.data.fps)?;
+        let start = made.frames.first().copied().unwrap_or(first);
+        for (keyframe, &frame) in self.keyframes.iter_mut().zip(&made.frames) {
+            (keyframe.frame, keyframe.time) = (frame, frame - start);
+        }
+        self.motion = self.motion.take().map(|(path, _)| (path, start));
+        self.own_times = Some(made.own_times);
+        let (source, more) = self.source_of(&path, &document, made.clip, frame_time)?;
+        self.notices.extend(notices.into_iter().chain(more));
+        self.sources.insert(path, source);
+        Ok(())
+    }
+
     fn source(&self, path: &Path) -> Result<(Source, Vec<String>), KeyframeError> {
         let document = bvh::read(path)?;
-        let clip = document.to_clip();
-        let own = clip.skeleton.is_dance_skeleton();
-        let channels = kept_channels(&document).filter(|_| own);
-        let mapping = self.mapping.as_ref().filter(|_| !own);
-        let (clip, notices) =
-            DanceClip::from_file(clip, mapping, &self.data).map_err(|source| {
-                KeyframeError::Clip {
-                    file: path.into(),
-                    source: source.into(),
-                }
-            })?;
-        Ok((Source { clip, channels }, notices))
+        let (clip, mut notices) = self.at_its_rate(path, document.to_clip())?;
+        let frame_time = clip.frame_time;
+        let (source, more) = self.source_of(path, &document, clip, frame_time)?;
+        notices.extend(more);
+        Ok((source, notices))
+    }
+
+    fn at_its_rate(&self, path: &Path, clip: Clip) -> Result<(Clip, Vec<String>), KeyframeError> {
+        let (clip, notices) = at_its_rate(clip, &self.data).map_err(unusable(path))?;
+        let named = notices
+            .iter()
+            .map(|notice| format!("{}: {notice}", clip.name));
+        let named = named.collect();
+        Ok((clip, named))
+    }
+
+    /// A file whose clip has been given its rate, `frame_time` its own.
+    fn source_of(
+        &self,
+        path: &Path,
+        document: &Bvh,
+        clip: Clip,
+        frame_time: f64,
+    ) -> Result<(Source, Vec<String>), KeyframeError> {
+        let data = DataConfig {
+            source_fps: None,
+            ..self.data.clone()
+        };
+        let mapping = Mapping::onto_dance_skeleton(&clip, self.mapping.as_ref())?;
+        let channels = kept_channels(document).filter(|_| mapping.is_none());
+        let rig = mapping.as_ref();
+        let rig = rig.map(|mapping| OwnRig::read(document, clip.clone(), mapping, &data));
+        let rig = rig.transpose().map_err(unusable(path))?;
+        let (clip, mut notices) =
+            DanceClip::from_file(clip, mapping.as_deref(), &data).map_err(unusable(path))?;
+        let on_rig = rig.as_ref();
+        notices.extend(on_rig.map(|rig| format!("{}: {}", clip.name, rig.notice())));
+        let source = Source {
+            clip,
+            channels,
+            rig,
+            frame_time,
+        };
+        Ok((source, notices))
     }
 
     /// Velocity factors of a further file, read on the same terms, in `frames` frames from its
@@ -452,27 +549,58 @@ impl Keyframes {
         runs_along.then(|| clip.features.slice(s![frames, ..]))
     }
 
-    /// A result as a file's content: with the channels of the first keyframe's file, or with Z X Y
-    /// rotations where these cannot hold it.
+    /// A result, whose keyframes are at `times`, as a file's content: on the rig of the first
+    /// keyframe's file, in its unit, axis and rate; or, from a file on the dance skeleton, with its
+    /// channels, or with Z X Y rotations where these cannot hold it.
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
-    pub fn document(&self, result: &Clip) -> Result<Bvh, BvhError> {
+    pub fn document(&self, result: &Clip, times: &[usize]) -> Result<Bvh, BvhError> {
         let first = self.keyframes.first();
-        let channels = first.and_then(|first| self.sources[&first.file].channels.clone());
-        let channels =
-            channels.unwrap_or_else(|| channel_layout(result, [Axis::Z, Axis::X, Axis::Y]));
-        Bvh::from_clip(result, channels)
+        let Some(first) = first.map(|first| &self.sources[&first.file]) else {
+            return Bvh::from_clip(result, channel_layout(result, ORDER));
+        };
+        let clip = match &first.rig {
+            Some(own) => own.motion(result, &self.on_rig(own, times)),
+            None => result.clone(),
+        };
+        let is_at_rate = (first.frame_time / clip.frame_time - 1.0).abs() < SAME_RATE;
+        let clip = match &self.own_times {
+            Some(own_times) => spread(clip, times, own_times, first.frame_time),
+            None if first.rig.is_none() || is_at_rate => clip,
+            None => retime(clip, times, first.frame_time),
+        };
+        let channels = match &first.rig {
+            Some(own) => own.channels(&clip),
+            None => {
+                let kept = first.channels.clone();
+                kept.unwrap_or_else(|| channel_layout(&clip, ORDER))
+            }
+        };
+        Bvh::from_clip(&clip, channels)
+    }
+
+    /// The keyframes whose files are on this rig.
+    fn on_rig(&self, own: &OwnRig, times: &[usize]) -> Vec<RigKeyframe> {
+        let keyframes = self.keyframes.iter().zip(times);
+        let on_it = keyframes.filter_map(|(keyframe, &time)| {
+            let source = &self.sources[&keyframe.file];
+            let rig = source.rig.as_ref().filter(|rig| rig.is_same(own))?;
+            Some(RigKeyframe {
+                time,
+                pose: rig.pose(keyframe.frame),
+                mapped: source.clip.clip.poses[keyframe.frame].clone(),
+            })
+        });
+        on_it.collect()
     }
 
     /// The request: trajectory and velocity factors of the dancer's clip where there is one.
-    /// `lengths`: frames from each of its keyframes to the next, none for their own distances, one
-    /// for all, or one for each.
     ///
     /// # Errors
     /// Frames that a file does not have; dancers that do not fit each other; keyframes beyond the
     /// end of the dancer's clip; lengths that do not fit the keyframes.
-    pub fn request(&self, lengths: &[u32]) -> Result<SequenceRequest, KeyframeError> {
+    pub fn request(&self) -> Result<SequenceRequest, KeyframeError> {
         let sources: Vec<KeyframeSource> = self
             .keyframes
             .iter()
@@ -495,7 +623,7 @@ impl Keyframes {
             });
         }
         let request = request.like(clip, *first)?;
-        match lengthened(lengths, self.keyframes.len())? {
+        match lengthened(&self.lengths, self.keyframes.len())? {
             Some(times) => Ok(request.at_times(&times)?),
             None => Ok(request),
         }

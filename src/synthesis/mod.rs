@@ -14,6 +14,8 @@ mod error;
 mod foot_cleanup;
 pub mod keyframes;
 mod motion;
+mod own_frames;
+mod own_rig;
 pub mod regenerate;
 mod request;
 mod retarget;

@@ -10,6 +10,8 @@ mod generated_data;
 mod martial_data;
 #[path = "../common/real_data.rs"]
 mod real_data;
+#[path = "../common/rigs.rs"]
+mod rigs;
 #[path = "../common/small_run.rs"]
 mod small_run;
 
@@ -34,6 +36,7 @@ mod odd_files;
 mod outputs;
 mod report;
 mod reproduce;
+mod rig;
 mod rotations;
 mod sampled;
 mod song;

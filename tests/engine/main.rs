@@ -7,6 +7,8 @@ mod lafan1_data;
 mod martial_data;
 #[path = "../common/real_data.rs"]
 mod real_data;
+#[path = "../common/rigs.rs"]
+mod rigs;
 
 mod dance_clip;
 
@@ -27,6 +29,7 @@ mod learning_rate;
 mod mapping;
 mod music;
 mod resample;
+mod rig;
 mod root_reconstruction;
 mod rotation_fit;
 mod rotation_window;

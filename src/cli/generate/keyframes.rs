@@ -22,9 +22,15 @@ pub struct KeyframeArgs {
     /// jump.bvh:75@60 or seconds such as jump.bvh:75@12.5s; may be repeated
     #[arg(long, value_name = "FILE.bvh:FRAME@TIME")]
     keyframe: Vec<TimedFrame>,
-    /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's]
+    /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's, or
+    /// the joints are recognised]
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
+    /// Count --keyframes and --length in frames of --motion at its own rate, each frame exactly as
+    /// the file has it, and write the result at that rate; with --length the frames are poses made
+    /// by hand, with no motion between them
+    #[arg(long, requires = "motion", conflicts_with = "keyframe")]
+    own_frames: bool,
     /// Frames from each keyframe of --motion to the next: one number for all, or one for each, such
     /// as 100,250
     #[arg(long, value_name = "FRAMES", value_delimiter = ',', requires = "motion", conflicts_with = "keyframe",
@@ -40,6 +46,7 @@ impl KeyframeArgs {
             motion: motion.map(|file| (file, self.keyframes.clone())),
             further: self.keyframe.iter().map(|it| it.at(fps)).collect(),
             mapping: self.mapping.clone(),
+            own_frames: self.own_frames,
         }
     }
 }

@@ -21,9 +21,9 @@ pub(super) fn synthesise(
     data: &DataConfig,
     warn: &mut dyn FnMut(String),
 ) -> Result<Dance, DanceError> {
-    let keyframes = Keyframes::read(&asked.keyframes, data)?;
+    let keyframes = Keyframes::read(&asked.keyframes, &asked.lengths, data)?;
     keyframes.notices().iter().cloned().for_each(&mut *warn);
-    let request = keyframes.request(&asked.lengths)?;
+    let request = keyframes.request()?;
     let (request, mut warnings) = asked.trajectory.apply(request, &keyframes)?;
     let (request, notices) = asked.velocity.apply(request, &keyframes)?;
     notices.into_iter().for_each(&mut *warn);
@@ -36,7 +36,7 @@ pub(super) fn synthesise(
     warnings.iter().map(ToString::to_string).for_each(warn);
     let (model, options) = (&*subject.model, asked.options);
     let sequence = synthesis::synthesise(model, &request, &options, &asked.name)?;
-    let document = keyframes.document(&sequence.clip);
+    let document = keyframes.document(&sequence.clip, &sequence.keyframes);
     let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
     Ok(Dance {
         document: document.map_err(DanceError::Document)?,
@@ -61,6 +61,12 @@ pub(super) fn complete(
     if asked.options.foot_cleanup {
         return Err(DanceError::Refused(format!(
             "--foot-cleanup: {what} keeps the standing foot still itself"
+        )));
+    }
+    if asked.keyframes.own_frames {
+        return Err(DanceError::Refused(format!(
+            "--own-frames: {what} counts frames at its own rate of {}",
+            data.fps
         )));
     }
     let needs = model.needs();

@@ -1,0 +1,258 @@
+//! A person's own rig through the binary: recognised, danced on, written as it was read.
+
+use std::fs;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use keydance::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
+use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
+use predicates::str::contains;
+use tempfile::TempDir;
+
+use crate::rigs::RIGS;
+use crate::small_run::{keydance, stderr};
+
+const FPS: f64 = 24.0;
+
+/// A rig as a Blender user may have it: in metres, Z up, 24 frames a second, 61 frames.
+fn own_clip(rig: usize) -> Bvh {
+    let mut skeleton = RIGS[rig].body().skeleton;
+    let z_up = |place: DVec3| DVec3::new(place.x, -place.z, place.y) / 100.0;
+    for joint in &mut skeleton.joints {
+        joint.offset = z_up(joint.offset);
+        joint.end_sites.iter_mut().for_each(|end| *end = z_up(*end));
+    }
+    let pose = |frame: usize| {
+        let time = frame as f64 / FPS;
+        let mut pose = skeleton.rest_pose();
+        for (joint, rotation) in pose.rotations.iter_mut().enumerate() {
+            let swing = 0.2 * (2.0 * time + joint as f64).sin();
+            *rotation = DQuat::from_rotation_z(swing) * DQuat::from_rotation_x(0.5 * swing);
+        }
+        pose.translations[0] += DVec3::new(0.1 * time, -0.2 * time, 0.02 * time.sin());
+        pose
+    };
+    let clip = Clip {
+        name: "own.bvh".into(),
+        frame_time: 1.0 / FPS,
+        poses: (0..61).map(pose).collect(),
+        skeleton,
+    };
+    let order = [Axis::X, Axis::Y, Axis::Z];
+    Bvh::from_clip(&clip, channel_layout(&clip, order)).unwrap()
+}
+
+fn config() -> String {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    format!("{folder}/experiments/pan2021/interpolation.toml")
+}
+
+fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let apart = a.iter().zip(b).map(|(a, b)| a.distance(*b));
+    apart.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_dance_between_keyframes_of_any_rig_is_on_that_rig_in_its_unit_axis_channels_and_rate() {
+    for (number, rig) in RIGS.iter().enumerate() {
+        let folder = TempDir::new().unwrap();
+        let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+        bvh::write(&own, &own_clip(number)).unwrap();
+        let document = bvh::read(&own).unwrap();
+        // 25, 50 and 75 at 30 frames a second are 20, 40 and 60 of the file's.
+        let mut command = keydance();
+        command
+            .arg("generate")
+            .arg(config())
+            .arg("--motion")
+            .arg(&own);
+        command
+            .args(["--keyframes", "0,25,50,75", "--foot-cleanup", "--out"])
+            .arg(&dance);
+        let output = command.output().unwrap();
+        let said = stderr(&output);
+        assert!(output.status.success(), "{}: {said}", rig.name);
+        assert!(said.contains("the result is on it"), "{said}");
+        let made = bvh::read(&dance).unwrap();
+        assert_eq!(
+            made.skeleton().joints.len(),
+            document.skeleton().joints.len()
+        );
+        assert_eq!(made.channels(), document.channels(), "{}", rig.name);
+        assert!((made.frame_time() * FPS - 1.0).abs() < 1e-6);
+        assert_eq!(made.frames(), 61);
+        let (made, document) = (made.to_clip(), document.to_clip());
+        for frame in [0, 20, 40, 60] {
+            let [a, b] =
+                [&made, &document].map(|clip| clip.poses[frame].world_positions(&clip.skeleton));
+            let apart = farthest(&a, &b);
+            assert!(apart < 1e-5, "{}, frame {frame}: {apart} m", rig.name);
+        }
+    }
+}
+
+#[test]
+fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
+    let folder = TempDir::new().unwrap();
+    let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+    bvh::write(&own, &own_clip(0)).unwrap();
+    let recorded = bvh::read(&own).unwrap().to_clip();
+    let generate = |more: &[&str]| {
+        let mut command = keydance();
+        command
+            .arg("generate")
+            .arg(config())
+            .arg("--motion")
+            .arg(&own);
+        command
+            .args(["--own-frames", "--force", "--out"])
+            .arg(&dance)
+            .args(more);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        bvh::read(&dance).unwrap().to_clip()
+    };
+    let is_met = |made: &Clip, time: usize, row: usize| {
+        let [a, b] = [(made, time), (&recorded, row)]
+            .map(|(clip, frame)| clip.poses[frame].world_positions(&clip.skeleton));
+        let apart = farthest(&a, &b);
+        assert!(apart < 1e-5, "row {row} at frame {time}: {apart} m");
+    };
+    let made = generate(&["--keyframes", "3,13,37,59"]);
+    assert_eq!(made.poses.len(), 57);
+    for row in [3, 13, 37, 59] {
+        is_met(&made, row - 3, row);
+    }
+    // Three rows made by hand, an odd number of frames from one to the next.
+    let made = generate(&["--keyframes", "4,5,6", "--length", "31,47"]);
+    assert_eq!(made.poses.len(), 79);
+    for (row, time) in [(4, 0), (5, 31), (6, 78)] {
+        is_met(&made, time, row);
+    }
+    let mut beyond = keydance();
+    beyond
+        .arg("generate")
+        .arg(config())
+        .arg("--motion")
+        .arg(&own);
+    beyond
+        .args(["--own-frames", "--keyframes", "0,61", "--out"])
+        .arg(folder.path().join("no.bvh"));
+    let said = stderr(&beyond.output().unwrap());
+    assert!(
+        said.contains("has no frame 61: its frames are 0 to 60 at 24"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_joint_without_channels_that_has_to_turn_gets_them() {
+    let folder = TempDir::new().unwrap();
+    let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+    let mut clip = own_clip(0).to_clip();
+    let finger = clip.skeleton.index_of("mixamorig:LeftHandIndex1").unwrap();
+    let spine = clip.skeleton.index_of("mixamorig:Spine").unwrap();
+    for pose in &mut clip.poses {
+        pose.rotations[finger] = DQuat::IDENTITY;
+        pose.rotations[spine] = DQuat::IDENTITY;
+    }
+    let mut channels = channel_layout(&clip, [Axis::Z, Axis::X, Axis::Y]);
+    channels[finger].clear();
+    channels[spine].clear();
+    bvh::write(&own, &Bvh::from_clip(&clip, channels.clone()).unwrap()).unwrap();
+    let mut command = keydance();
+    command
+        .arg("generate")
+        .arg(config())
+        .arg("--motion")
+        .arg(&own);
+    command.args(["--keyframes", "0,75", "--out"]).arg(&dance);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let made = bvh::read(&dance).unwrap();
+    assert_eq!(made.channels()[finger], []);
+    let rotations = made.channels()[spine].iter();
+    let rotations = rotations.filter(|it| matches!(it, Channel::Rotation(_)));
+    assert!([0, 3].contains(&rotations.count()));
+}
+
+#[test]
+fn a_rig_that_is_not_recognised_is_mapped_by_a_file_that_the_program_began() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let text = own_clip(0)
+        .to_text()
+        .replace("mixamorig:LeftForeArm", "tentacle");
+    fs::write(path("own.bvh"), text).unwrap();
+    let generate = |more: &[&str]| {
+        let mut command = keydance();
+        command
+            .current_dir(folder.path())
+            .args(["generate", &config()]);
+        command.args([
+            "--motion",
+            "own.bvh",
+            "--keyframes",
+            "0,75",
+            "--out",
+            "dance.bvh",
+        ]);
+        command.args(more).output().unwrap()
+    };
+    let refused = generate(&[]);
+    assert!(!refused.status.success());
+    let said = stderr(&refused);
+    assert!(
+        said.contains("LeftForeArm") && said.contains("keydance rig"),
+        "{said}"
+    );
+    let mut rig = keydance();
+    rig.current_dir(folder.path())
+        .args(["rig", "own.bvh", "--out", "map.toml"]);
+    let output = assert_cmd::Command::from_std(rig).assert().success();
+    output.stdout(contains("LeftForeArm    not found"));
+    // What a person does: a right side that was found says what the left one is called.
+    let whole = RIGS[0].body().sources;
+    let mut lines = String::from("[joints]\n");
+    for joint in DANCE_JOINTS {
+        let source = whole[joint].replace("mixamorig:LeftForeArm", "tentacle");
+        lines += &format!("{joint} = \"{source}\"\n");
+    }
+    let begun = fs::read_to_string(path("map.toml")).unwrap();
+    let kept: Vec<&str> = begun
+        .lines()
+        .filter(|line| line.contains(" = \"mixamo"))
+        .collect();
+    assert!(!kept.is_empty() && kept.iter().all(|line| lines.contains(line)));
+    fs::write(path("map.toml"), lines).unwrap();
+    assert!(Mapping::read(&path("map.toml")).is_ok());
+    let output = generate(&["--mapping", "map.toml"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let made = bvh::read(&path("dance.bvh")).unwrap();
+    assert!(made.skeleton().index_of("tentacle").is_some());
+}
+
+#[test]
+fn completions_and_man_pages_know_every_command() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = keydance().args(["completions", shell]).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            text.contains("generate") && text.contains("keyframes"),
+            "{shell}"
+        );
+    }
+    let folder = TempDir::new().unwrap();
+    let pages = folder.path().join("man/man1");
+    assert!(
+        keydance()
+            .arg("man")
+            .arg(&pages)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let page = |name: &str| fs::read_to_string(Path::new(&pages).join(name)).unwrap();
+    assert!(page("keydance.1").contains("keydance"));
+    assert!(page("keydance-generate.1").contains("keyframes"));
+}
