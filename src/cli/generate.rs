@@ -1,6 +1,7 @@
 //! `keydance generate`: reads a run's folder and keyframes from BVH files, writes the dance between
 //! them as BVH.
 
+mod built_in;
 mod keyframes;
 mod song;
 mod trajectory;
@@ -35,9 +36,10 @@ use velocity::VelocityArgs;
 /// needs and does not get is an error.
 #[derive(Debug, Args)]
 pub struct GenerateArgs {
-    /// Folder of a run, or the config of a model that needs no training
+    /// Folder of a run, or the config of a model that needs no training [default: a model that comes
+    /// with the program, between keyframes or to --music]
     #[arg(value_name = "RUN_DIR_OR_CONFIG")]
-    run: PathBuf,
+    run: Option<PathBuf>,
     #[command(flatten)]
     keyframes: KeyframeArgs,
     #[command(flatten)]
@@ -75,7 +77,7 @@ pub struct GenerateArgs {
     json: Option<PathBuf>,
     /// Override a key of the config; of a run's model only one that acts after the network, such
     /// as model.velocity_refinement=false or rtr.meet_target=linear; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", requires = "run")]
     set: Vec<String>,
     /// Replace files that are there already
     #[arg(long)]
@@ -118,7 +120,11 @@ impl GenerateArgs {
 /// The run, a file or a control cannot be used, or they do not fit each other; nothing is written
 /// then. A file cannot be written.
 pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
-    let mut subject = Subject::open(&args.run, &args.set)?;
+    let mut subject = match &args.run {
+        Some(run) => Subject::open(run, &args.set)?,
+        None if args.song.is_asked() => Subject::built_in(&built_in::MUSIC)?,
+        None => Subject::built_in(&built_in::DANCE)?,
+    };
     subject.check_features()?;
     Dance::check_model(&subject)?;
     let data = args.units.over(&subject.config.data);

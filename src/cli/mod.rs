@@ -15,6 +15,8 @@ mod list;
 mod manual;
 mod music;
 mod notice;
+mod pack;
+mod plot;
 mod progress;
 mod regenerate;
 mod reproduce;
@@ -25,6 +27,7 @@ mod study;
 mod tables;
 mod threads;
 mod train;
+mod view;
 mod watched;
 
 use std::io;
@@ -81,6 +84,12 @@ enum Command {
     Regenerate(regenerate::RegenerateArgs),
     #[command(after_help = include_str!("help/runs.txt"))]
     Runs(runs::RunsArgs),
+    #[command(after_help = include_str!("help/view.txt"))]
+    View(view::ViewArgs),
+    #[command(after_help = include_str!("help/plot.txt"))]
+    Plot(plot::PlotArgs),
+    #[command(after_help = include_str!("help/pack.txt"))]
+    Pack(pack::PackArgs),
     #[command(after_help = include_str!("help/rig.txt"))]
     Rig(rig::RigArgs),
     /// Look into BVH files
@@ -134,6 +143,9 @@ impl Cli {
             Command::Runs(args) => runs::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Choreography(args) => choreography::run(args)?,
+            Command::View(args) => view::run(args)?,
+            Command::Plot(args) => plot::run(args)?,
+            Command::Pack(args) => pack::run(args)?,
             Command::Rig(args) => rig::run(args)?,
             Command::Bvh(args) => bvh::run(args)?,
             Command::Features(args) => features::run(args)?,

@@ -14,7 +14,7 @@ use super::progress::Progress;
 use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use crate::data::Dataset;
-use crate::experiment::ExperimentConfig;
+use crate::experiment::{Curves, ExperimentConfig};
 use crate::models::weights::SavedWeights;
 use crate::run::RunFolder;
 use crate::training::{Outcome, Resumed, Trainer};
@@ -96,6 +96,7 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     drop(progress);
     match outcome? {
         Outcome::Finished => {
+            Curves::write_into_run(&run, &config)?;
             writeln!(out, "{}", run.weights().display())?;
             writeln!(out, "weights {}", trainer.weights_digest())?;
             Ok(ExitCode::SUCCESS)

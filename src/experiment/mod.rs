@@ -1,8 +1,11 @@
 //! Experiments: configs in layers, and the tables that many of them make.
 
 pub mod config;
+mod curves;
 mod error;
 mod evaluated;
+#[cfg(feature = "cli")]
+mod event_file;
 mod layers;
 mod report;
 mod reproduce;
@@ -11,6 +14,7 @@ pub mod rows;
 mod scoring;
 
 pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
+pub use curves::Curves;
 pub use error::ReproduceError;
 pub use evaluated::EvaluatedRun;
 pub use layers::ConfigError;

@@ -4,17 +4,14 @@
 use std::path::{Path, PathBuf};
 
 use super::ReproduceError;
+use super::curves::Curves;
 use super::rows::Row;
 use crate::data::{DataPart, Dataset};
-use crate::evaluation::scores::AVERAGE;
 use crate::evaluation::{EvaluatedData, EvaluationRecord, ProtocolScores};
-use crate::report::{LossSeries, loss_curve, thousands, validation_curve};
-use crate::run::{FileError, LogLine, RunFolder, replace_file};
+use crate::run::{FileError, RunFolder, replace_file};
 
-const LOSS_CURVE: &str = "loss_curve.svg";
 /// How results that are in the way are made again.
 const REMEDY: &str = "remove that folder to make it again, or give another --out";
-const VALIDATION_CURVE: &str = "validation_curve.svg";
 
 /// What became of a row: its folder in `--out`, which holds config, manifest, scores and figures.
 pub struct RowResults {
@@ -83,58 +80,19 @@ impl RowResults {
             let manifest = run.manifest_path();
             let content = std::fs::read(&manifest).map_err(FileError::at(&manifest, "read"))?;
             replace_file(&self.folder.manifest_path(), &content)?;
-            self.write_curves(row, &run.log()?)?;
+            let log = run.log()?;
+            if !log.is_empty() {
+                Curves::of(&row.folder, &row.config, log).write(path, &Curves::OF_ROW)?;
+            }
         }
         let data = EvaluatedData::of(dataset, DataPart::Test)?;
         Ok(EvaluationRecord { scores, data }.write(path)?)
     }
 
-    fn write_curves(&self, row: &Row, log: &[LogLine]) -> Result<(), ReproduceError> {
-        let Some(last) = log.last() else {
-            return Ok(());
-        };
-        let title = |what: &str| {
-            let frame_steps = thousands(last.frame_steps);
-            format!("{what} of {}, {frame_steps} frame-steps", row.folder)
-        };
-        let points = |of: &dyn Fn(&LogLine) -> Option<f64>| -> Vec<(f64, f64)> {
-            let point = |line: &LogLine| Some((line.frame_steps as f64, of(line)?));
-            log.iter().filter_map(point).collect()
-        };
-        let mut series = vec![LossSeries {
-            name: "total".into(),
-            points: points(&|line| Some(line.total)),
-        }];
-        series.extend(last.losses.keys().map(|name| LossSeries {
-            name: name.clone(),
-            points: points(&|line| line.losses.get(name).copied()),
-        }));
-        let path = self.folder.path();
-        let losses = loss_curve(&title("Losses"), &series)?;
-        replace_file(&path.join(LOSS_CURVE), losses)?;
-        let mut scored = log.iter().rev().filter_map(|line| line.validation.as_ref());
-        let Some(scores) = scored.next() else {
-            return Ok(());
-        };
-        let protocols = row.config.protocols();
-        let mut metrics = protocols.iter().flat_map(|protocol| protocol.metrics());
-        let found = metrics.find_map(|metric| Some((metric, scores.row(metric.key)?)));
-        let Some((metric, row)) = found else {
-            return Ok(());
-        };
-        let columns = row.columns().filter(|column| *column != AVERAGE);
-        let score =
-            |line: &LogLine, column: &str| line.validation.as_ref()?.row(metric.key)?.at(column);
-        let series = columns.map(|column| (column, points(&|line| score(line, column))));
-        let title = title(&format!("{} on validation clips", metric.title));
-        let curve = validation_curve(&title, metric, series.collect())?;
-        Ok(replace_file(&path.join(VALIDATION_CURVE), curve)?)
-    }
-
     /// Files that are there, by their names.
     pub fn files(&self) -> Vec<PathBuf> {
         let [scores, data] = EvaluationRecord::files(DataPart::Test);
-        let own = [scores, data, LOSS_CURVE, VALIDATION_CURVE];
+        let own = [scores, data].into_iter().chain(Curves::OF_ROW);
         let mut files = vec![self.folder.config_path(), self.folder.manifest_path()];
         files.extend(own.map(|name| self.folder.path().join(name)));
         files.retain(|path| path.exists());

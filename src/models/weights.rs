@@ -1,5 +1,5 @@
 //! Weights as a safetensors file that PyTorch loads: every parameter and buffer by its name in f32,
-//! the statistics that the model needs beside them, and the config.
+//! or large ones in f16, the statistics that the model needs beside them, and the config.
 //!
 //! The metadata has one entry, `keydance`: JSON with `config` (TOML) and `version` (of the program
 //! that wrote the file).
@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
+use half::f16;
 use ndarray::{ArrayD, IxDyn};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,9 @@ use crate::run::FileError;
 const METADATA: &str = "keydance";
 /// Bytes that a weights file may have beside its weights: config, names, shapes, statistics.
 const LARGEST_HEADER: u64 = 1 << 24;
+
+/// Arrays of fewer values than this stay in f32 where others become f16: biases, statistics.
+const SMALL: usize = 1024;
 
 /// Why a file does not give the weights of a model.
 #[derive(Debug, Error)]
@@ -80,11 +84,18 @@ pub fn to_safetensors(
         .iter()
         .map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)))
         .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()?;
-    let metadata = serde_json::to_string(&Metadata {
+    let metadata = Metadata {
         config: config.into(),
         version: env!("CARGO_PKG_VERSION").into(),
-    })
-    .map_err(safetensors::SafeTensorError::from)?;
+    };
+    serialised(views, &metadata)
+}
+
+fn serialised(
+    views: Vec<(&str, TensorView<'_>)>,
+    metadata: &Metadata,
+) -> Result<Vec<u8>, WeightsError> {
+    let metadata = serde_json::to_string(metadata).map_err(safetensors::SafeTensorError::from)?;
     // One entry only: several would be written in an order that changes from run to run.
     let metadata = HashMap::from([(METADATA.to_string(), metadata)]);
     Ok(safetensors::serialize(views, Some(metadata))?)
@@ -155,6 +166,39 @@ impl SavedWeights {
             version,
             arrays: arrays.collect::<Result<_, WeightsError>>()?,
         })
+    }
+
+    /// The content of a weights file of half the size: arrays of 1,024 values and more in f16,
+    /// rounded to the nearest.
+    ///
+    /// # Errors
+    /// A weight is beyond the range of f16.
+    pub fn to_half(&self) -> Result<Vec<u8>, WeightsError> {
+        let mut tensors: Vec<(&str, Dtype, &[usize], Vec<u8>)> = Vec::new();
+        for (name, array) in &self.arrays {
+            let values = array.iter().copied();
+            if array.len() < SMALL {
+                tensors.push((name, Dtype::F32, array.shape(), bytes(values)));
+                continue;
+            }
+            let halves: Vec<f16> = values.map(f16::from_f32).collect();
+            if halves.iter().any(|half| !half.is_finite()) {
+                let path = self.path.display();
+                let problem = format!("{path}: a weight of {name} is beyond the range of f16");
+                return Err(WeightsError::Refused(problem));
+            }
+            let data = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
+            tensors.push((name, Dtype::F16, array.shape(), data));
+        }
+        let views = tensors.iter().map(|(name, dtype, shape, data)| {
+            Ok((*name, TensorView::new(*dtype, shape.to_vec(), data)?))
+        });
+        let views = views.collect::<Result<Vec<_>, safetensors::SafeTensorError>>()?;
+        let metadata = Metadata {
+            config: self.config.clone(),
+            version: self.version.clone(),
+        };
+        serialised(views, &metadata)
     }
 
     /// One of the model's [`Statistics`]; `expected` is its shape.
@@ -231,12 +275,22 @@ impl SavedWeights {
 
 fn array(path: &Path, name: &str, view: &TensorView) -> Result<ArrayD<f32>, WeightsError> {
     let bad = |found: String| misfit(path, name, format_args!("{found}"), format_args!("F32"));
-    if view.dtype() != Dtype::F32 {
-        return Err(bad(view.dtype().to_string()));
-    }
-    let (chunks, _) = view.data().as_chunks::<4>();
-    let values = chunks.iter().map(|bytes| f32::from_le_bytes(*bytes));
-    ArrayD::from_shape_vec(IxDyn(view.shape()), values.collect())
+    let values: Vec<f32> = match view.dtype() {
+        Dtype::F32 => {
+            let (chunks, _) = view.data().as_chunks::<4>();
+            chunks
+                .iter()
+                .map(|bytes| f32::from_le_bytes(*bytes))
+                .collect()
+        }
+        Dtype::F16 => {
+            let (chunks, _) = view.data().as_chunks::<2>();
+            let halves = chunks.iter().map(|bytes| f16::from_le_bytes(*bytes));
+            halves.map(f16::to_f32).collect()
+        }
+        other => return Err(bad(other.to_string())),
+    };
+    ArrayD::from_shape_vec(IxDyn(view.shape()), values)
         .map_err(|error| bad(format!("{:?} ({error})", view.shape())))
 }
 

@@ -33,7 +33,9 @@ pub use run_table::RunTable;
 pub use schedule_note::{NO_TRAINING, schedule_note};
 pub use score_figure::{ScoreSeries, score_curve, score_figure};
 pub use thousands::thousands;
-pub use training_curves::{LossSeries, loss_curve, validation_curve};
+pub use training_curves::{
+    Series, learning_rate_curve, loss_curve, total_losses_curve, validation_curve,
+};
 pub use viewer::{
     Asked, MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion, ViewerMusic,
 };

@@ -5,13 +5,13 @@ use super::chart::{Axis, Chart, Line, Scale};
 use super::score_figure::metric_axis;
 use crate::evaluation::Metric;
 
-/// The total loss or one of its terms.
+/// One line over the course of a training.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LossSeries {
+pub struct Series {
     /// Its name in the legend, such as `L_rec`.
     pub name: String,
-    /// `(frame-steps, loss)`: predicted frames that the training had gone through, and the mean
-    /// loss since the point before.
+    /// `(frame-steps, value)`, ascending: predicted frames that the training had gone through, and
+    /// the mean since the point before.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -26,23 +26,39 @@ const POINTS: usize = 300;
 /// # Errors
 ///
 /// [`FigureError`]: no positive loss at all, or one that is NaN or infinite.
-pub fn loss_curve(title: &str, series: &[LossSeries]) -> Result<String, FigureError> {
+pub fn loss_curve(title: &str, series: &[Series]) -> Result<String, FigureError> {
     let lines = series.iter().enumerate().map(|(index, series)| Line {
         name: series.name.clone(),
         emphasised: index == 0,
         ..Line::plain(thinned(&series.points), index)
     });
-    Chart {
-        title: title.to_string(),
-        caption: String::new(),
-        x: Axis::linear("training (frame-steps)"),
-        y: Axis {
-            label: "loss (standardised units, log scale)".into(),
-            scale: Scale::Logarithmic,
-        },
-        lines: lines.collect(),
+    over_frame_steps(title, loss_axis(), lines.collect())
+}
+
+/// Draws the total losses of several trainings in the same way.
+///
+/// # Errors
+///
+/// As [`loss_curve`].
+pub fn total_losses_curve(title: &str, series: &[Series]) -> Result<String, FigureError> {
+    over_frame_steps(title, loss_axis(), one_each(series))
+}
+
+fn loss_axis() -> Axis {
+    Axis {
+        label: "loss (standardised units, log scale)".into(),
+        scale: Scale::Logarithmic,
     }
-    .svg()
+}
+
+/// A line for each training, thinned.
+fn one_each(series: &[Series]) -> Vec<Line> {
+    let lines = series.iter().enumerate().map(|(colour, series)| Line {
+        name: series.name.clone(),
+        emphasised: true,
+        ..Line::plain(thinned(&series.points), colour)
+    });
+    lines.collect()
 }
 
 /// Means of equal runs of points, at most [`POINTS`] of them.
@@ -59,8 +75,8 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Draws a metric on validation clips over frame-steps: for each column of its table, such as a
-/// length N in frames, a line through `(frame-steps, score)`, ascending in frame-steps.
+/// Draws a metric on validation clips over frame-steps, a line for each column of its table or for
+/// each of several trainings.
 ///
 /// # Errors
 ///
@@ -68,21 +84,34 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 pub fn validation_curve(
     title: &str,
     metric: &Metric,
-    columns: Vec<(&str, Vec<(f64, f64)>)>,
+    series: Vec<Series>,
 ) -> Result<String, FigureError> {
-    let lines = columns.into_iter().enumerate();
-    let lines = lines.map(|(colour, (column, points))| Line {
-        name: format!("N = {column}"),
-        dots: points.len() <= 30,
+    let lines = series.into_iter().enumerate();
+    let lines = lines.map(|(colour, series)| Line {
+        name: series.name,
+        dots: series.points.len() <= 30,
         emphasised: true,
-        ..Line::plain(points, colour)
+        ..Line::plain(series.points, colour)
     });
+    over_frame_steps(title, Axis::linear(&metric_axis(metric)), lines.collect())
+}
+
+/// Draws learning rates over frame-steps, a line for each training.
+///
+/// # Errors
+///
+/// [`FigureError`]: no points, or a NaN or infinity.
+pub fn learning_rate_curve(title: &str, series: &[Series]) -> Result<String, FigureError> {
+    over_frame_steps(title, Axis::linear("learning rate"), one_each(series))
+}
+
+fn over_frame_steps(title: &str, y: Axis, lines: Vec<Line>) -> Result<String, FigureError> {
     Chart {
         title: title.to_string(),
         caption: String::new(),
         x: Axis::linear("training (frame-steps)"),
-        y: Axis::linear(&metric_axis(metric)),
-        lines: lines.collect(),
+        y,
+        lines,
     }
     .svg()
 }

@@ -23,6 +23,10 @@ pub struct LogLine {
     pub frame_steps: u64,
     pub total: f64,
     pub losses: BTreeMap<String, f64>,
+    pub learning_rate: f64,
+    pub gradient_norm: f64,
+    /// Wall-clock time of the step.
+    pub seconds: f64,
     /// Scores on validation clips after the step, where it was scored.
     #[serde(default)]
     pub validation: Option<Scores>,

@@ -1,6 +1,7 @@
 //! A run's folder: config, manifest, log, checkpoints, weights, each there whole or not at all.
 
 mod best;
+mod built_in;
 pub mod checkpoint;
 mod durable;
 mod error;
@@ -9,11 +10,13 @@ mod lock;
 pub(crate) mod log;
 pub mod manifest;
 mod output;
+mod packing;
 pub mod state;
 mod status;
 mod subject;
 mod trained_model;
 
+pub use built_in::BuiltIn;
 pub use durable::FileError;
 pub(crate) use durable::{remove as remove_file, replace as replace_file, write_json};
 pub use error::RunError;

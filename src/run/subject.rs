@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::durable::FileError;
 use super::error::RunError;
 use super::folder::RunFolder;
+use super::manifest::Manifest;
 use super::output::{check_output_folder, place};
 use crate::data::{Dataset, is_clip};
 use crate::evaluation::{EvaluatedData, EvaluationRecord};
@@ -19,6 +20,8 @@ pub struct Subject {
     pub what: String,
     /// The run's folder; none for a config.
     pub run: Option<RunFolder>,
+    /// What is known of its training; none for a config.
+    pub manifest: Option<Manifest>,
 }
 
 /// Refuses a config that differs from the run's in what the run's model was trained with.
@@ -82,11 +85,13 @@ impl Subject {
                 )));
             }
         };
+        let manifest = run.as_ref().map(RunFolder::manifest).transpose()?.flatten();
         Ok(Self {
             what: format!("{}{source}", config.name),
             config,
             model,
             run,
+            manifest,
         })
     }
 
@@ -115,7 +120,7 @@ impl Subject {
                 differences.join("; ")
             )));
         }
-        if let Some(manifest) = run.manifest()?
+        if let Some(manifest) = &self.manifest
             && manifest.data_digest != dataset.digest
         {
             return Err(RunError::Refused(format!(
@@ -169,8 +174,7 @@ impl Subject {
     pub fn check_no_clip(&self, file: &Path) -> Result<(), RunError> {
         let place = place(file);
         let folder = place.parent().filter(|_| is_clip(file));
-        let manifest = self.run.as_ref().map(RunFolder::manifest).transpose()?;
-        match folder.zip(manifest.flatten()) {
+        match folder.zip(self.manifest.as_ref()) {
             Some((folder, manifest))
                 if Dataset::digest_of(folder).as_ref() == Some(&manifest.data_digest) =>
             {

@@ -1,5 +1,6 @@
 //! Keyframes from files: which frames of which, and when.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -14,6 +15,7 @@ use crate::data::{DataConfig, DataError, at_its_rate};
 use crate::models::transition::DanceClip;
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
+use crate::motion::oddities::oddities;
 use crate::motion::rig::{RigKeyframe, retime, spread};
 use crate::motion::{Clip, Mapping, MappingError};
 
@@ -439,9 +441,14 @@ impl Keyframes {
         for (keyframe, &frame) in self.keyframes.iter_mut().zip(&made.frames) {
             (keyframe.frame, keyframe.time) = (frame, frame - start);
         }
-        self.motion = self.motion.take().map(|(path, _)| (path, start));
         self.own_times = Some(made.own_times);
-        let (source, more) = self.source_of(&path, &document, made.clip, frame_time)?;
+        let of_dancer = oddities(&made.clip);
+        let (source, mut more) = self.source_of(&path, &document, made.clip, frame_time)?;
+        if self.motion.is_none() {
+            // What is odd between poses that were made by hand is no dancer's.
+            more.retain(|notice| !of_dancer.iter().any(|odd| notice.ends_with(odd)));
+        }
+        self.motion = self.motion.take().map(|(path, _)| (path, start));
         self.notices.extend(notices.into_iter().chain(more));
         self.sources.insert(path, source);
         Ok(())
@@ -477,14 +484,20 @@ impl Keyframes {
             source_fps: None,
             ..self.data.clone()
         };
-        let mapping = Mapping::onto_dance_skeleton(&clip, self.mapping.as_ref())?;
+        // Unit and axis of a file whose own frames count are the result's, too.
+        let mapping = match (&self.own_times, &self.mapping) {
+            (Some(_), None) => Some(Cow::Owned(Mapping::recognised(&clip)?)),
+            (_, given) => Mapping::onto_dance_skeleton(&clip, given.as_ref())?,
+        };
         let channels = kept_channels(document).filter(|_| mapping.is_none());
         let rig = mapping.as_ref();
         let rig = rig.map(|mapping| OwnRig::read(document, clip.clone(), mapping, &data));
         let rig = rig.transpose().map_err(unusable(path))?;
         let (clip, mut notices) =
             DanceClip::from_file(clip, mapping.as_deref(), &data).map_err(unusable(path))?;
-        let on_rig = rig.as_ref();
+        let on_rig = rig
+            .as_ref()
+            .filter(|_| !document.skeleton().is_dance_skeleton());
         notices.extend(on_rig.map(|rig| format!("{}: {}", clip.name, rig.notice())));
         let source = Source {
             clip,

@@ -34,6 +34,7 @@ mod help;
 mod music;
 mod odd_files;
 mod outputs;
+mod passed_on;
 mod report;
 mod reproduce;
 mod rig;

@@ -5,8 +5,8 @@ use keydance::evaluation::Protocol as _;
 use keydance::evaluation::equations::Equations;
 use keydance::motion::{DANCE_PARENTS, JOINTS};
 use keydance::report::{
-    FigureError, LossSeries, MotionFigure, MotionRow, PathView, Placing, RootPaths, ScoreSeries,
-    Shown, loss_curve, score_curve, thousands,
+    FigureError, MotionFigure, MotionRow, PathView, Placing, RootPaths, ScoreSeries, Series, Shown,
+    loss_curve, score_curve, thousands,
 };
 use roxmltree::{Document, Node};
 
@@ -265,9 +265,9 @@ fn root_trajectories_share_a_scale_and_the_caption_stands_under_the_figure() {
     assert_eq!(caption.join(" "), figure.caption.trim());
 }
 
-fn losses() -> Vec<LossSeries> {
+fn losses() -> Vec<Series> {
     [("total", 30.0), ("L_rec", 20.0), ("L_key", 2.0)]
-        .map(|(name, from)| LossSeries {
+        .map(|(name, from)| Series {
             name: name.into(),
             points: (1..=1000)
                 .map(|step| (640.0 * f64::from(step), from / f64::from(step).sqrt()))
@@ -338,7 +338,7 @@ fn losses_of_zero_are_left_out_and_infinite_ones_are_errors() {
 
 #[test]
 fn one_point_is_a_chart_too() {
-    let single = LossSeries {
+    let single = Series {
         name: "total".into(),
         points: vec![(640.0, 3.0)],
     };

@@ -9,6 +9,7 @@ use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
 use predicates::str::contains;
 use tempfile::TempDir;
 
+use crate::generated_data::write_clips;
 use crate::rigs::RIGS;
 use crate::small_run::{keydance, stderr};
 
@@ -143,6 +144,42 @@ fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
         said.contains("has no frame 61: its frames are 0 to 60 at 24"),
         "{said}"
     );
+}
+
+#[test]
+fn the_dance_skeleton_itself_keeps_its_unit_where_its_own_frames_count() {
+    let folder = TempDir::new().unwrap();
+    write_clips(folder.path(), 60, 3);
+    let clips = fs::read_dir(folder.path()).unwrap();
+    let file = clips.map(|clip| clip.unwrap().path()).min().unwrap();
+    let mut clip = bvh::read(&file).unwrap().to_clip();
+    for joint in &mut clip.skeleton.joints {
+        joint.offset /= 100.0;
+        joint.end_sites.iter_mut().for_each(|end| *end /= 100.0);
+    }
+    let places = clip
+        .poses
+        .iter_mut()
+        .flat_map(|pose| &mut pose.translations);
+    places.for_each(|place| *place /= 100.0);
+    let channels = channel_layout(&clip, [Axis::Z, Axis::X, Axis::Y]);
+    bvh::write(&file, &Bvh::from_clip(&clip, channels).unwrap()).unwrap();
+    let dance = folder.path().join("dance.bvh");
+    let mut command = keydance();
+    command
+        .arg("generate")
+        .arg(config())
+        .arg("--motion")
+        .arg(&file);
+    command
+        .args(["--own-frames", "--keyframes", "5,40", "--out"])
+        .arg(&dance);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let made = bvh::read(&dance).unwrap().to_clip();
+    let [a, b] = [(&made, 35), (&clip, 40)]
+        .map(|(clip, frame)| clip.poses[frame].world_positions(&clip.skeleton));
+    assert!(farthest(&a, &b) < 1e-5);
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl Fixture {
     }
 
     /// The `index`-th file of the data with this ending.
-    fn file(&self, index: usize, ending: &str) -> PathBuf {
+    pub fn file(&self, index: usize, ending: &str) -> PathBuf {
         let entries = fs::read_dir(self.path("data")).unwrap();
         let paths = entries.map(|entry| entry.unwrap().path());
         let mut files: Vec<PathBuf> = paths

@@ -2,6 +2,7 @@
 //! browser.
 
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -14,16 +15,19 @@ use keydance::models::transition::TransitionModel;
 use keydance::models::transition::window_features;
 use keydance::models::transition::{DanceClip, TransitionRequest};
 use keydance::motion::JOINTS;
+use keydance::motion::bvh::{self, Axis as BvhAxis, Bvh};
 use keydance::motion::placement::world_positions;
 use keydance::motion::skeleton::{Joint, Skeleton};
 use keydance::report::{
     Asked, FigureError, MotionKind, Viewer, ViewerBody, ViewerKeyframe, ViewerMotion,
 };
 use ndarray::{Axis, concatenate, s};
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::browser;
+use crate::generated_data::write_clips;
+use crate::trained_run::keydance;
 use crate::viewer_page::page_data;
 
 const LENGTH: usize = 250;
@@ -67,6 +71,7 @@ fn viewer() -> Viewer {
             request.velocity_factors.view(),
         )),
         music: None,
+        picks: None,
     }
 }
 
@@ -140,6 +145,65 @@ fn what_does_not_fit_together_is_an_error_that_names_it() {
         ..viewer()
     };
     assert!(matches!(empty.html(), Err(FigureError::Empty { .. })));
+}
+
+/// A page of two clips from one folder.
+fn clips_page(folder: &Path) -> PathBuf {
+    write_clips(folder, 40, 3);
+    let mut clips: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|it| it.unwrap().path())
+        .collect();
+    clips.sort();
+    let mut short = bvh::read(&clips[1]).unwrap().to_clip();
+    short.poses.truncate(25);
+    let channels = bvh::channel_layout(&short, [BvhAxis::Z, BvhAxis::X, BvhAxis::Y]);
+    let short_file = folder.join("short.bvh");
+    bvh::write(&short_file, &Bvh::from_clip(&short, channels).unwrap()).unwrap();
+    let page = folder.join("page.html");
+    let mut view = keydance("view");
+    view.args([&clips[0], &short_file]).arg("--out").arg(&page);
+    view.assert().success();
+    page
+}
+
+#[test]
+fn clips_are_shown_together_and_a_shorter_one_stands_still_at_its_end() {
+    let folder = TempDir::new().unwrap();
+    let page = fs::read_to_string(clips_page(folder.path())).unwrap();
+    let data = page_data(&page);
+    assert_eq!(
+        (&data["frames"], &data["picks"]),
+        (&json!(40), &json!("--keyframes"))
+    );
+    assert_eq!(data["motions"].as_array().unwrap().len(), 2);
+    let factors = data["motions"][1]["factors"].as_array().unwrap();
+    let fastest = |frame: usize| {
+        let parts = factors[frame].as_array().unwrap().iter();
+        parts.map(|it| it.as_f64().unwrap()).fold(0.0, f64::max)
+    };
+    assert!(fastest(10) > 0.3 && fastest(35) < 0.05);
+}
+
+#[test]
+fn a_frame_is_picked_by_a_key() {
+    let Some(browser) = browser::browser() else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let file = clips_page(folder.path());
+    let press = "<script type=\"module\">setTimeout(() => document.body.dispatchEvent(\
+                 new KeyboardEvent(\"keydown\", { key: \"m\", bubbles: true })), 300)</script></body>";
+    let page = fs::read_to_string(&file).unwrap().replace("</body>", press);
+    fs::write(&file, page).unwrap();
+    let loaded = browser::load(&browser, &file, "#frame=12", 1500);
+    assert!(!loaded.document.contains("data-error"), "{}", loaded.log);
+    let tag = |id: &str| {
+        let at = loaded.document.find(&format!("id=\"{id}\"")).unwrap();
+        let end = loaded.document[at..].find('>').unwrap();
+        loaded.document[at..at + end].to_string()
+    };
+    assert!(!tag("picked").contains("hidden"), "{}", tag("picked"));
 }
 
 #[test]
@@ -225,6 +289,7 @@ fn positions_come_back_to_half_a_step_however_wide_the_motion() {
             keyframes: Vec::new(),
             asked: None,
             music: None,
+            picks: None,
         };
         let data = page_data(&viewer.html().unwrap());
         let positions = &data["motions"][0]["positions"];
@@ -266,6 +331,7 @@ fn a_body_of_any_joints_is_drawn_and_a_pose_of_others_is_refused() {
         keyframes: Vec::new(),
         asked: None,
         music: None,
+        picks: None,
     };
     let data = page_data(&viewer(vec![vec![DVec3::ZERO; 3]; 2]).html().unwrap());
     assert_eq!(data["parents"], serde_json::json!([-1, 0, 1]));

@@ -44,6 +44,11 @@ pub struct SongArgs {
 }
 
 impl SongArgs {
+    /// Whether there is a song.
+    pub fn is_asked(&self) -> bool {
+        self.music.is_some()
+    }
+
     /// The song that they ask for, if any, at so many frames a second.
     pub fn request(&self, fps: f64) -> Option<SongRequest> {
         let motion = |from: &FileFrom| Seed::Motion(from.file.clone(), from.given());

@@ -4,10 +4,9 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use super::Standardisation;
-use crate::experiment::ExperimentConfig;
 use crate::motion::PARTS;
 use crate::motion::features::{ROOT_POSITION, ROOT_VELOCITY, VELOCITY_FACTORS};
-use crate::run::{RunError, RunFolder};
+use crate::run::{RunError, Subject};
 
 /// Share of the frames that lie below a bound.
 const SHARE: f64 = 0.999;
@@ -28,18 +27,20 @@ pub struct DataRanges {
 }
 
 impl DataRanges {
-    /// Bounds of what a run's model was trained on; none where it needs no training.
+    /// Bounds of what a model was trained on; none where it needs no training.
     ///
     /// # Errors
-    /// The run's manifest or weights cannot be read.
-    pub fn of_run(run: &RunFolder, config: &ExperimentConfig) -> Result<Option<Self>, RunError> {
+    /// The run's weights cannot be read.
+    pub fn of_subject(subject: &Subject) -> Result<Option<Self>, RunError> {
+        let config = &subject.config;
         if config.model.untrained(&config.data).is_some() {
             return Ok(None);
         }
-        let saved = run.manifest()?.and_then(|it| it.fact("data_ranges"));
-        if saved.is_some() {
+        let manifest = subject.manifest.as_ref();
+        let saved = manifest.and_then(|it| it.fact("data_ranges"));
+        let Some(run) = subject.run.as_ref().filter(|_| saved.is_none()) else {
             return Ok(saved);
-        }
+        };
         let weights = run.saved_weights(config)?;
         let statistics = Standardisation::saved(&weights)?;
         Ok(Some(Self::from_statistics(&statistics)))

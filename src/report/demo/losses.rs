@@ -1,12 +1,12 @@
 //! The losses of a training, kept for a figure.
 
-use crate::report::{FigureError, LossSeries, loss_curve, thousands};
+use crate::report::{FigureError, Series, loss_curve, thousands};
 use crate::training::StepReport;
 
 /// Losses over a training: the total, then its terms.
 #[derive(Debug, Default)]
 pub struct Losses {
-    series: Vec<LossSeries>,
+    series: Vec<Series>,
     frame_steps: u64,
 }
 
@@ -17,7 +17,7 @@ impl Losses {
         for (index, (name, loss)) in total.chain(report.losses.iter().copied()).enumerate() {
             if index == self.series.len() {
                 let (name, points) = (name.into(), Vec::new());
-                self.series.push(LossSeries { name, points });
+                self.series.push(Series { name, points });
             }
             let points = &mut self.series[index].points;
             points.push((report.frame_steps as f64, loss));

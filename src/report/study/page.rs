@@ -85,6 +85,7 @@ impl PageClip {
             keyframes: Vec::new(),
             asked: None,
             music: None,
+            picks: None,
         };
         Ok(viewer.data()?)
     }

@@ -32,6 +32,7 @@ impl Viewer {
                 request.velocity_factors.view(),
             )),
             music: None,
+            picks: None,
         }
     }
 }
@@ -92,6 +93,7 @@ fn completed_page(
         keyframes: keyframes.collect(),
         asked: None,
         music: None,
+        picks: None,
     }
     .html()
 }

@@ -6,6 +6,8 @@
 
 mod body;
 #[cfg(feature = "papers")]
+mod clips;
+#[cfg(feature = "papers")]
 mod generated;
 mod page;
 mod positions;
@@ -25,6 +27,8 @@ use crate::motion::velocity_factor::{PARTS, measured_velocity_factors};
 use positions::Steps;
 
 pub use body::ViewerBody;
+#[cfg(feature = "papers")]
+pub use clips::clips_page;
 #[cfg(feature = "papers")]
 pub use generated::dance_page;
 #[cfg(feature = "papers")]
@@ -51,6 +55,9 @@ pub struct Viewer {
     pub asked: Option<Asked>,
     /// What is played in step with them.
     pub music: Option<ViewerMusic>,
+    /// The option by which frames that are picked on the page become keyframes; none where none are
+    /// to be picked.
+    pub picks: Option<&'static str>,
 }
 
 /// The song that motions dance to, from their first frame on.
@@ -194,6 +201,7 @@ impl Viewer {
             trajectory: asked.root_trajectory.iter().map(place).collect(),
             asked: rounded_rows(&asked.velocity_factors),
             music: self.music.clone(),
+            picks: self.picks,
         })
     }
 
@@ -308,6 +316,7 @@ pub(in crate::report) struct PageData {
     trajectory: Vec<[f64; 3]>,
     asked: Vec<[f64; PARTS]>,
     music: Option<ViewerMusic>,
+    picks: Option<&'static str>,
 }
 
 #[derive(Serialize)]

@@ -16,7 +16,11 @@ pub(in crate::report) const SCENE_SCRIPTS: [&str; 4] = [
     include_str!("music.js"),
 ];
 /// What is round it.
-const SCRIPTS: [&str; 2] = [include_str!("curves.js"), include_str!("player.js")];
+const SCRIPTS: [&str; 3] = [
+    include_str!("curves.js"),
+    include_str!("hand_on.js"),
+    include_str!("player.js"),
+];
 
 /// The viewer's page: `{{title}}`, `{{style}}`, `{{data}}`, `{{script}}`.
 pub(super) fn page(title: &str, data: &impl Serialize) -> String {

@@ -31,6 +31,7 @@ function tick(now) {
   perPixel = drawScene(time.frame, look);
   drawCurves(time.frame);
   showTime();
+  filmed();
 }
 
 function advance(elapsed) {
@@ -53,6 +54,7 @@ function showTime() {
   scrub.setAttribute("aria-valuetext", `frame ${frame} of ${LAST}${isKeyframe(frame) ? ", keyframe" : ""}`);
   const seconds = (frames) => (frames * data.frameTime).toFixed(1);
   element("counter").innerHTML = `${frame} / ${LAST}<small>${seconds(frame)} of ${seconds(LAST)} s</small>`;
+  element("pick").setAttribute("aria-pressed", picked.has(frame));
   root.dataset.frame = frame;
   root.dataset.playing = time.playing;
 }
@@ -190,6 +192,8 @@ const keys = {
   k: () => toggleMark("keyframes"),
   p: () => toggleMark("paths"),
   c: () => toggleMark("contacts"),
+  m: pick,
+  l: link,
   f: toggleFollow,
   r: resetCamera,
   t: switchTheme,
@@ -199,8 +203,8 @@ const keys = {
 function onKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
   // Controls keep the keys that they use themselves.
-  const control = event.target.closest("button, select");
-  if (control && (event.key === " " || (control.matches("select") && event.key.startsWith("Arrow")))) return;
+  const control = event.target.closest("button, select, #picked");
+  if (control && (event.key === " " || (control.matches("select, #picked") && event.key.startsWith("Arrow")))) return;
   const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   if (/^[1-9]$/.test(name)) toggleMotion(Number(name) - 1);
   else if (keys[name]) keys[name](event);
@@ -284,6 +288,7 @@ function begin() {
   element("ask").addEventListener("click", () => element("help").showModal());
   addEventListener("keydown", onKey);
   listenToPointers();
+  listenToHandOn();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => setTheme(event.matches ? "dark" : "light"));
   const resized = new ResizeObserver(() => {
     forgetStrips();

@@ -19,6 +19,8 @@ const lineColour = (hue) => (colours.dark ? colours[hue] : colours[`${hue}-edge`
 /** Thickness of the bone that ends at a joint, cm. */
 const thickness = data.thickness;
 const HEAD_RADIUS = 9.5;
+/** How much of a dancer over another is seen. */
+const OVERLAID = 0.7;
 
 /** Cells of the canvas for dancers side by side, as large as they can be. */
 function cells(count, width, height) {
@@ -155,13 +157,13 @@ function addBones(view, pose, hue, ghost, parts) {
   if (seen[2] > 10) parts.push({ a: seen, depth: seen[2], radius: HEAD_RADIUS * view.scale(seen[2]), hue, ghost });
 }
 
-function drawParts(parts) {
+function drawParts(parts, alpha = 1) {
   parts.sort((one, other) => other.depth - one.depth);
   scene.save();
   scene.lineCap = "round";
   for (const { a, b, width, radius, hue, ghost } of parts) {
     const [fill, edge] = [colours[hue], colours[`${hue}-edge`]];
-    scene.globalAlpha = ghost ? 0.22 : 1;
+    scene.globalAlpha = ghost ? 0.22 : alpha;
     if (radius) {
       scene.beginPath();
       scene.arc(a[0], a[1], radius, 0, 2 * Math.PI);
@@ -171,7 +173,7 @@ function drawParts(parts) {
         scene.strokeStyle = edge;
         scene.lineWidth = 1;
         scene.stroke();
-        scene.globalAlpha = 0.3;
+        scene.globalAlpha = 0.3 * alpha;
         scene.beginPath();
         scene.arc(a[0] - 0.3 * radius, a[1] - 0.35 * radius, 0.4 * radius, 0, 2 * Math.PI);
         scene.fillStyle = "#fff";
@@ -192,7 +194,7 @@ function drawParts(parts) {
     } else {
       bone(edge, width + 2, 0);
       bone(fill, width, 0);
-      scene.globalAlpha = 0.28;
+      scene.globalAlpha = 0.28 * alpha;
       bone("#fff", width * 0.28, width * 0.16);
     }
   }
@@ -240,7 +242,7 @@ function drawScene(frame, look) {
       if (look.contacts) drawContacts(view, motion, poses[dancer], frame);
       addBones(view, poses[dancer], isKeyframe(frame) ? "keyframe" : motion.hue, false, parts);
     });
-    drawParts(parts);
+    drawParts(parts, group.length > 1 ? OVERLAID : 1);
     scene.restore();
     if (side) drawLabel(cell, group[0], index);
   });

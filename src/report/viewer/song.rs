@@ -146,6 +146,7 @@ pub fn song_page(
         keyframes: keyframes.collect(),
         asked: None,
         music: Some(music),
+        picks: None,
     };
     Ok(viewer.html()?)
 }

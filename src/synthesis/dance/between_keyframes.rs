@@ -27,9 +27,7 @@ pub(super) fn synthesise(
     let (request, mut warnings) = asked.trajectory.apply(request, &keyframes)?;
     let (request, notices) = asked.velocity.apply(request, &keyframes)?;
     notices.into_iter().for_each(&mut *warn);
-    let run = subject.run.as_ref();
-    let ranges = run.map(|run| DataRanges::of_run(run, &subject.config));
-    let ranges = ranges.transpose()?.flatten();
+    let ranges = DataRanges::of_subject(subject)?;
     let unread = asked.unread(&subject.model.needs()).into_iter();
     warnings.extend(unread.map(ControlWarning::Unread));
     warnings.extend(control_warnings(&request, ranges.as_ref()));

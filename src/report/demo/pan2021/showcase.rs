@@ -138,6 +138,7 @@ impl<'d> Showcase<'d> {
             keyframes: keyframes.to_vec(),
             asked: asked.map(|(root, factors)| Asked::new(root.view(), factors.view())),
             music: None,
+            picks: None,
         }
         .html()
     }

@@ -1,0 +1,31 @@
+//! A run to pass on: what its model is used with, and nothing else.
+
+use std::path::Path;
+
+use super::durable::{FileError, replace as replace_file};
+use super::error::RunError;
+use super::folder::RunFolder;
+use super::output::check_output_folder;
+
+impl RunFolder {
+    /// Writes config, manifest and the newest weights into a folder, which is a run's folder then:
+    /// large arrays of the weights in f16, without what a training would go on with.
+    ///
+    /// # Errors
+    /// The run has no weights or a damaged file; the folder holds other files, unless `force` is
+    /// given; a file cannot be written.
+    pub fn pack(&self, folder: &Path, force: bool) -> Result<(), RunError> {
+        let config = self.config()?;
+        let weights = self.saved_weights(&config)?.to_half()?;
+        check_output_folder(folder, force)?;
+        std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
+        let packed = RunFolder::open(folder);
+        packed.write_config(&config)?;
+        if self.manifest_path().exists() {
+            let path = self.manifest_path();
+            let manifest = std::fs::read(&path).map_err(FileError::at(&path, "read"))?;
+            replace_file(&packed.manifest_path(), manifest)?;
+        }
+        Ok(replace_file(&packed.weights(), weights)?)
+    }
+}
