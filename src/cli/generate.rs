@@ -151,6 +151,9 @@ pub fn run(args: GenerateArgs) -> anyhow::Result<()> {
         let mut tell = |notice| warn((number == 0).then_some(notice));
         dances.push(Dance::make(&subject, &request, &data, &mut tell)?);
     }
+    let mut further = dances.iter().skip(1);
+    let alike = further.any(|dance| dance.document.motion() == dances[0].document.motion());
+    warn(alike.then_some("the model draws nothing: dances of --count are the same"));
     let page = args.viewer.as_ref();
     let page = page.map(|path| dance_page(&subject, &dances, &data, args.song.sound(path)));
     let page = page.transpose()?;

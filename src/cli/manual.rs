@@ -20,6 +20,9 @@ pub struct CompletionsArgs {
 pub struct ManArgs {
     /// Folder for the pages, made if it is not there
     folder: PathBuf,
+    /// Replace pages that are there already
+    #[arg(long)]
+    force: bool,
 }
 
 /// # Errors
@@ -36,6 +39,10 @@ pub fn completions(args: &CompletionsArgs) -> anyhow::Result<()> {
 pub fn man(args: &ManArgs) -> anyhow::Result<()> {
     let folder = &args.folder;
     let failed = || format!("the pages cannot be written to {}", folder.display());
+    let page = folder.join("keydance.1");
+    if page.exists() && !args.force {
+        anyhow::bail!("{} is there already; --force replaces it", page.display());
+    }
     std::fs::create_dir_all(folder).with_context(failed)?;
     clap_mangen::generate_to(Cli::command(), folder).with_context(failed)?;
     writeln!(io::stdout(), "{}", folder.display())?;

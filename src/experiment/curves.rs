@@ -43,7 +43,7 @@ impl Curves {
     /// Those of runs' folders, called as these are.
     ///
     /// # Errors
-    /// A folder is no run's, or has no steps in its log.
+    /// A folder is no run's, or has no steps in its log; two have one name.
     pub fn read(folders: &[PathBuf]) -> Result<Self, ReproduceError> {
         let read = |folder: &PathBuf| {
             let run = RunFolder::open(folder);
@@ -54,10 +54,20 @@ impl Curves {
                     folder.display()
                 )));
             }
-            let name = folder.file_name().unwrap_or(folder.as_os_str());
+            let place = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
+            let name = place.file_name().unwrap_or(folder.as_os_str());
             Ok(Course::of(name.to_string_lossy().into(), &config, log))
         };
-        let runs = folders.iter().map(read).collect::<Result<_, _>>()?;
+        let runs = folders.iter().map(read);
+        let runs: Vec<Course> = runs.collect::<Result<_, ReproduceError>>()?;
+        for (index, run) in runs.iter().enumerate() {
+            if runs[..index].iter().any(|other| other.name == run.name) {
+                return Err(ReproduceError::Refused(format!(
+                    "two of the runs are called {}; give one of them at a time",
+                    run.name
+                )));
+            }
+        }
         Ok(Self { runs })
     }
 

@@ -84,6 +84,13 @@ impl RunFolder {
         }
         run.check_config(&run.config()?.differences(config)?)?;
         checkpoint::remove_partial(&run.checkpoints())?;
+        if run.weights().exists() && checkpoint::list(&run.checkpoints())?.is_empty() {
+            return Err(RunError::Refused(format!(
+                "{} holds weights and no checkpoint, as a packed run does: a training cannot go on \
+                 from it; give another --out",
+                path.display()
+            )));
+        }
         Ok(run)
     }
 

@@ -13,11 +13,18 @@ impl RunFolder {
     ///
     /// # Errors
     /// The run has no weights or a damaged file; the folder holds other files, unless `force` is
-    /// given; a file cannot be written.
+    /// given, or a run that a training wrote, whatever is given; a file cannot be written.
     pub fn pack(&self, folder: &Path, force: bool) -> Result<(), RunError> {
         let config = self.config()?;
         let weights = self.saved_weights(&config)?.to_half()?;
         check_output_folder(folder, force)?;
+        let there = RunFolder::open(folder);
+        if there.log_path().exists() || there.checkpoints().exists() || self.is_at(folder) {
+            return Err(RunError::Refused(format!(
+                "{} is a run's folder, whose weights would be lost; give another one",
+                folder.display()
+            )));
+        }
         std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
         let packed = RunFolder::open(folder);
         packed.write_config(&config)?;
@@ -27,5 +34,9 @@ impl RunFolder {
             replace_file(&packed.manifest_path(), manifest)?;
         }
         Ok(replace_file(&packed.weights(), weights)?)
+    }
+
+    fn is_at(&self, folder: &Path) -> bool {
+        same_file::is_same_file(self.path(), folder).unwrap_or(false)
     }
 }

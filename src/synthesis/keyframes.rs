@@ -16,7 +16,7 @@ use crate::models::transition::DanceClip;
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
 use crate::motion::oddities::oddities;
-use crate::motion::rig::{RigKeyframe, retime, spread};
+use crate::motion::rig::{RigKeyframe, nearest_frames, retime, spread};
 use crate::motion::{Clip, Mapping, MappingError};
 
 /// Channels of a joint that has none of its own.
@@ -499,6 +499,8 @@ impl Keyframes {
             .as_ref()
             .filter(|_| !document.skeleton().is_dance_skeleton());
         notices.extend(on_rig.map(|rig| format!("{}: {}", clip.name, rig.notice())));
+        let stiff = rig.as_ref().and_then(OwnRig::stiff_joints);
+        notices.extend(stiff.map(|stiff| format!("{}: {stiff}", clip.name)));
         let source = Source {
             clip,
             channels,
@@ -591,6 +593,19 @@ impl Keyframes {
             }
         };
         Bvh::from_clip(&clip, channels)
+    }
+
+    /// The frames of a [document](Keyframes::document) that frames `times` of a result become, and
+    /// its seconds a frame, where these are others.
+    pub fn times_in_document(&self, times: &[usize]) -> Option<(Vec<usize>, f64)> {
+        let first = &self.sources[&self.keyframes.first()?.file];
+        let ratio = 1.0 / (first.frame_time * self.data.fps);
+        let own_times = match &self.own_times {
+            Some(own_times) => own_times.clone(),
+            None if first.rig.is_none() || (ratio - 1.0).abs() < SAME_RATE => return None,
+            None => nearest_frames(times, ratio),
+        };
+        Some((own_times, first.frame_time))
     }
 
     /// The keyframes whose files are on this rig.

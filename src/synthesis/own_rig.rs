@@ -77,6 +77,24 @@ impl OwnRig {
         )
     }
 
+    /// What is to be known of its channels: joints that turn about one or two axes only.
+    pub fn stiff_joints(&self) -> Option<String> {
+        let rotations =
+            |channels: &[Channel]| channels.iter().filter(|it| !is_position(it)).count();
+        let joints = self.rig.skeleton.joints.iter().zip(&self.channels);
+        let stiff = joints.filter(|(_, channels)| [1, 2].contains(&rotations(channels)));
+        let names: Vec<&str> = stiff.map(|(joint, _)| joint.name.as_str()).collect();
+        let first = names.first()?;
+        let others = match names.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        Some(format!(
+            "{first}{others} turn about one or two axes in the file, and about all three in the \
+             result"
+        ))
+    }
+
     /// A dance on it as its file has motions: in its unit and axis.
     pub fn motion(&self, dance: &Clip, keyframes: &[RigKeyframe]) -> Clip {
         let mut clip = onto_rig(dance, &self.rig, keyframes);

@@ -88,6 +88,20 @@ impl Summary {
     }
 }
 
+impl Summary {
+    /// The same in the frames of a file of another rate: when the keyframes are there, and its
+    /// seconds a frame.
+    #[must_use]
+    pub fn at_frames(mut self, times: &[usize], frame_time: f64) -> Self {
+        self.frames = times.last().map_or(0, |last| last + 1);
+        self.fps = 1.0 / frame_time;
+        for (keyframe, &frame) in self.keyframes.iter_mut().zip(times) {
+            keyframe.frame = frame;
+        }
+        self
+    }
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.model)?;

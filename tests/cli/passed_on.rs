@@ -81,6 +81,31 @@ fn a_packed_run_is_half_as_large_and_dances_alike() {
     };
     pack().assert().success();
     pack().assert().failure().stderr(contains("--force"));
+    pack().arg("--force").assert().success();
+    // A run that a training wrote is no place for it, its own least of all.
+    let weights = run.path("run/weights.safetensors");
+    let before = fs::read(&weights).unwrap();
+    let mut onto_itself = keydance("pack");
+    onto_itself
+        .arg(&packed)
+        .arg("--out")
+        .arg(run.path("run"))
+        .arg("--force");
+    onto_itself
+        .assert()
+        .failure()
+        .stderr(contains("would be lost"));
+    assert_eq!(fs::read(&weights).unwrap(), before);
+    let mut resumed = keydance("train");
+    resumed
+        .arg(run.path("small.toml"))
+        .arg("--data")
+        .arg(run.path("data"));
+    resumed.arg("--resume").arg("--out").arg(&packed);
+    resumed
+        .assert()
+        .failure()
+        .stderr(contains("as a packed run does"));
     let dance = |from: &Path, name: &str| {
         let clips = fs::read_dir(run.path("data")).unwrap();
         let mut clips: Vec<_> = clips.map(|clip| clip.unwrap().path()).collect();

@@ -7,6 +7,7 @@ use glam::{DQuat, DVec3};
 use keydance::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
 use predicates::str::contains;
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::generated_data::write_clips;
@@ -125,7 +126,24 @@ fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
         is_met(&made, row - 3, row);
     }
     // Three rows made by hand, an odd number of frames from one to the next.
-    let made = generate(&["--keyframes", "4,5,6", "--length", "31,47"]);
+    let json = folder.path().join("dance.json");
+    let named = json.display().to_string();
+    let made = generate(&[
+        "--keyframes",
+        "4,5,6",
+        "--length",
+        "31,47",
+        "--json",
+        &named,
+    ]);
+    let said: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+    let frames = said["keyframes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| it["frame"].as_u64());
+    assert!(frames.eq([Some(0), Some(31), Some(78)]), "{said}");
+    assert_eq!(said["frames"], 79);
     assert_eq!(made.poses.len(), 79);
     for (row, time) in [(4, 0), (5, 31), (6, 78)] {
         is_met(&made, time, row);
@@ -180,6 +198,42 @@ fn the_dance_skeleton_itself_keeps_its_unit_where_its_own_frames_count() {
     let [a, b] = [(&made, 35), (&clip, 40)]
         .map(|(clip, frame)| clip.poses[frame].world_positions(&clip.skeleton));
     assert!(farthest(&a, &b) < 1e-5);
+}
+
+#[test]
+fn a_taller_dancers_keyframe_on_the_same_rig_is_put_onto_the_first_ones_bones() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let document = own_clip(0);
+    bvh::write(&path("own.bvh"), &document).unwrap();
+    let mut tall = document.to_clip();
+    for joint in &mut tall.skeleton.joints {
+        joint.offset *= 1.1;
+        joint.end_sites.iter_mut().for_each(|end| *end *= 1.1);
+    }
+    let places = tall
+        .poses
+        .iter_mut()
+        .flat_map(|pose| &mut pose.translations);
+    places.for_each(|place| *place *= 1.1);
+    let channels = document.channels().to_vec();
+    bvh::write(&path("tall.bvh"), &Bvh::from_clip(&tall, channels).unwrap()).unwrap();
+    let mut command = keydance();
+    command
+        .current_dir(folder.path())
+        .args(["generate", &config()]);
+    command.args(["--keyframe", "own.bvh:0@0", "--keyframe", "tall.bvh:50@50"]);
+    let output = command.args(["--out", "dance.bvh"]).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let [made, tall] =
+        ["dance.bvh", "tall.bvh"].map(|name| bvh::read(&path(name)).unwrap().to_clip());
+    let own = bvh::read(&path("own.bvh")).unwrap();
+    assert_eq!(made.skeleton, *own.skeleton());
+    let [a, b] =
+        [(&made, made.poses.len() - 1), (&tall, 40)].map(|(clip, frame)| &clip.poses[frame]);
+    for (joint, (a, b)) in a.rotations.iter().zip(&b.rotations).enumerate() {
+        assert!(a.angle_between(*b) < 1e-5, "joint {joint}");
+    }
 }
 
 #[test]

@@ -120,6 +120,12 @@ impl Rig {
     /// One frame: `positions` and `rotations` are the dance's, in the world.
     fn pose(&self, positions: &[DVec3], rotations: &[DQuat], anchor: &Anchor) -> Pose {
         let mut pose = anchor.pose.clone();
+        // Another dancer's keyframe on the rig is put onto this one's bones.
+        for (index, joint) in self.skeleton.joints.iter().enumerate() {
+            if !self.moves[index] && joint.parent.is_some() {
+                pose.translations[index] = joint.offset;
+            }
+        }
         let mut world: Vec<DQuat> = Vec::with_capacity(self.skeleton.len());
         for (index, joint) in self.skeleton.joints.iter().enumerate() {
             let above = joint.parent.map_or(DQuat::IDENTITY, |parent| world[parent]);

@@ -35,7 +35,10 @@ pub(super) fn synthesise(
     let (model, options) = (&*subject.model, asked.options);
     let sequence = synthesis::synthesise(model, &request, &options, &asked.name)?;
     let document = keyframes.document(&sequence.clip, &sequence.keyframes);
-    let summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
+    let mut summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
+    if let Some((times, frame_time)) = keyframes.times_in_document(&sequence.keyframes) {
+        summary = summary.at_frames(&times, frame_time);
+    }
     Ok(Dance {
         document: document.map_err(DanceError::Document)?,
         summary: DanceSummary::Sequence(summary),
