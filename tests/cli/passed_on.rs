@@ -188,6 +188,13 @@ fn without_a_run_a_model_that_comes_with_the_program_dances() {
     to_music.arg("--music").arg(FIXTURE.file(0, "wav"));
     to_music.arg("--seed-motion").arg(FIXTURE.file(0, "bvh"));
     assert!(frames(&mut to_music, "to_music.bvh", "demo_pu2022") > 200);
+    let mut several = FIXTURE.command("generate");
+    several.arg("--music").arg(FIXTURE.file(0, "wav"));
+    several.arg("--seed-motion").arg(FIXTURE.file(0, "bvh"));
+    several
+        .args(["--count", "2", "--out"])
+        .arg(run.path("several.bvh"));
+    several.assert().success().stderr(contains("draws nothing"));
     let mut set = keydance("generate");
     set.args([
         "--set",

@@ -2,8 +2,11 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Output;
 
+use clap::CommandFactory as _;
 use glam::{DQuat, DVec3};
+use keydance::cli::Cli;
 use keydance::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
 use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
 use predicates::str::contains;
@@ -49,6 +52,24 @@ fn config() -> String {
     format!("{folder}/experiments/pan2021/interpolation.toml")
 }
 
+/// `keydance generate` in a folder, by interpolation, into dance.bvh.
+fn generate(folder: &Path, more: &[&str]) -> Output {
+    let mut command = keydance();
+    command.current_dir(folder).args(["generate", &config()]);
+    command
+        .args(["--out", "dance.bvh"])
+        .args(more)
+        .output()
+        .unwrap()
+}
+
+/// The dance of a generation that succeeds.
+fn danced(folder: &Path, more: &[&str]) -> Bvh {
+    let output = generate(folder, more);
+    assert!(output.status.success(), "{more:?}: {}", stderr(&output));
+    bvh::read(&folder.join("dance.bvh")).unwrap()
+}
+
 fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
     let apart = a.iter().zip(b).map(|(a, b)| a.distance(*b));
     apart.fold(0.0, f64::max)
@@ -58,24 +79,20 @@ fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
 fn a_dance_between_keyframes_of_any_rig_is_on_that_rig_in_its_unit_axis_channels_and_rate() {
     for (number, rig) in RIGS.iter().enumerate() {
         let folder = TempDir::new().unwrap();
-        let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+        let own = folder.path().join("own.bvh");
         bvh::write(&own, &own_clip(number)).unwrap();
         let document = bvh::read(&own).unwrap();
         // 25, 50 and 75 at 30 frames a second are 20, 40 and 60 of the file's.
-        let mut command = keydance();
-        command
-            .arg("generate")
-            .arg(config())
-            .arg("--motion")
-            .arg(&own);
-        command
-            .args(["--keyframes", "0,25,50,75", "--foot-cleanup", "--out"])
-            .arg(&dance);
-        let output = command.output().unwrap();
-        let said = stderr(&output);
-        assert!(output.status.success(), "{}: {said}", rig.name);
-        assert!(said.contains("the result is on it"), "{said}");
-        let made = bvh::read(&dance).unwrap();
+        let keyframes = [
+            "--motion",
+            "own.bvh",
+            "--keyframes",
+            "0,25,50,75",
+            "--foot-cleanup",
+        ];
+        let said = stderr(&generate(folder.path(), &keyframes));
+        assert!(said.contains("the result is on it"), "{}: {said}", rig.name);
+        let made = bvh::read(&folder.path().join("dance.bvh")).unwrap();
         assert_eq!(
             made.skeleton().joints.len(),
             document.skeleton().joints.len()
@@ -96,23 +113,12 @@ fn a_dance_between_keyframes_of_any_rig_is_on_that_rig_in_its_unit_axis_channels
 #[test]
 fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
     let folder = TempDir::new().unwrap();
-    let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+    let own = folder.path().join("own.bvh");
     bvh::write(&own, &own_clip(0)).unwrap();
     let recorded = bvh::read(&own).unwrap().to_clip();
-    let generate = |more: &[&str]| {
-        let mut command = keydance();
-        command
-            .arg("generate")
-            .arg(config())
-            .arg("--motion")
-            .arg(&own);
-        command
-            .args(["--own-frames", "--force", "--out"])
-            .arg(&dance)
-            .args(more);
-        let output = command.output().unwrap();
-        assert!(output.status.success(), "{}", stderr(&output));
-        bvh::read(&dance).unwrap().to_clip()
+    let own_frames = |more: &[&str]| {
+        let motion = ["--motion", "own.bvh", "--own-frames", "--force"];
+        danced(folder.path(), &[&motion, more].concat()).to_clip()
     };
     let is_met = |made: &Clip, time: usize, row: usize| {
         let [a, b] = [(made, time), (&recorded, row)]
@@ -120,22 +126,22 @@ fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
         let apart = farthest(&a, &b);
         assert!(apart < 1e-5, "row {row} at frame {time}: {apart} m");
     };
-    let made = generate(&["--keyframes", "3,13,37,59"]);
+    let made = own_frames(&["--keyframes", "3,13,37,59"]);
     assert_eq!(made.poses.len(), 57);
     for row in [3, 13, 37, 59] {
         is_met(&made, row - 3, row);
     }
     // Three rows made by hand, an odd number of frames from one to the next.
-    let json = folder.path().join("dance.json");
-    let named = json.display().to_string();
-    let made = generate(&[
+    let by_hand = [
         "--keyframes",
         "4,5,6",
         "--length",
         "31,47",
         "--json",
-        &named,
-    ]);
+        "dance.json",
+    ];
+    let made = own_frames(&by_hand);
+    let json = folder.path().join("dance.json");
     let said: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     let frames = said["keyframes"]
         .as_array()
@@ -148,16 +154,15 @@ fn frames_counted_at_the_files_own_rate_are_met_exactly_as_it_has_them() {
     for (row, time) in [(4, 0), (5, 31), (6, 78)] {
         is_met(&made, time, row);
     }
-    let mut beyond = keydance();
-    beyond
-        .arg("generate")
-        .arg(config())
-        .arg("--motion")
-        .arg(&own);
-    beyond
-        .args(["--own-frames", "--keyframes", "0,61", "--out"])
-        .arg(folder.path().join("no.bvh"));
-    let said = stderr(&beyond.output().unwrap());
+    let beyond = [
+        "--motion",
+        "own.bvh",
+        "--own-frames",
+        "--keyframes",
+        "0,61",
+        "--force",
+    ];
+    let said = stderr(&generate(folder.path(), &beyond));
     assert!(
         said.contains("has no frame 61: its frames are 0 to 60 at 24"),
         "{said}"
@@ -182,19 +187,9 @@ fn the_dance_skeleton_itself_keeps_its_unit_where_its_own_frames_count() {
     places.for_each(|place| *place /= 100.0);
     let channels = channel_layout(&clip, [Axis::Z, Axis::X, Axis::Y]);
     bvh::write(&file, &Bvh::from_clip(&clip, channels).unwrap()).unwrap();
-    let dance = folder.path().join("dance.bvh");
-    let mut command = keydance();
-    command
-        .arg("generate")
-        .arg(config())
-        .arg("--motion")
-        .arg(&file);
-    command
-        .args(["--own-frames", "--keyframes", "5,40", "--out"])
-        .arg(&dance);
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", stderr(&output));
-    let made = bvh::read(&dance).unwrap().to_clip();
+    let name = file.file_name().unwrap().to_str().unwrap();
+    let keyframes = ["--motion", name, "--own-frames", "--keyframes", "5,40"];
+    let made = danced(folder.path(), &keyframes).to_clip();
     let [a, b] = [(&made, 35), (&clip, 40)]
         .map(|(clip, frame)| clip.poses[frame].world_positions(&clip.skeleton));
     assert!(farthest(&a, &b) < 1e-5);
@@ -218,15 +213,9 @@ fn a_taller_dancers_keyframe_on_the_same_rig_is_put_onto_the_first_ones_bones() 
     places.for_each(|place| *place *= 1.1);
     let channels = document.channels().to_vec();
     bvh::write(&path("tall.bvh"), &Bvh::from_clip(&tall, channels).unwrap()).unwrap();
-    let mut command = keydance();
-    command
-        .current_dir(folder.path())
-        .args(["generate", &config()]);
-    command.args(["--keyframe", "own.bvh:0@0", "--keyframe", "tall.bvh:50@50"]);
-    let output = command.args(["--out", "dance.bvh"]).output().unwrap();
-    assert!(output.status.success(), "{}", stderr(&output));
-    let [made, tall] =
-        ["dance.bvh", "tall.bvh"].map(|name| bvh::read(&path(name)).unwrap().to_clip());
+    let keyframes = ["--keyframe", "own.bvh:0@0", "--keyframe", "tall.bvh:50@50"];
+    let made = danced(folder.path(), &keyframes).to_clip();
+    let tall = bvh::read(&path("tall.bvh")).unwrap().to_clip();
     let own = bvh::read(&path("own.bvh")).unwrap();
     assert_eq!(made.skeleton, *own.skeleton());
     let [a, b] =
@@ -237,34 +226,76 @@ fn a_taller_dancers_keyframe_on_the_same_rig_is_put_onto_the_first_ones_bones() 
 }
 
 #[test]
-fn a_joint_without_channels_that_has_to_turn_gets_them() {
+fn a_joint_that_has_to_turn_gets_the_channels_that_its_file_lacks() {
     let folder = TempDir::new().unwrap();
-    let [own, dance] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+    let path = |name: &str| folder.path().join(name);
     let mut clip = own_clip(0).to_clip();
-    let finger = clip.skeleton.index_of("mixamorig:LeftHandIndex1").unwrap();
-    let spine = clip.skeleton.index_of("mixamorig:Spine").unwrap();
-    for pose in &mut clip.poses {
-        pose.rotations[finger] = DQuat::IDENTITY;
-        pose.rotations[spine] = DQuat::IDENTITY;
-    }
+    bvh::write(&path("turns.bvh"), &own_clip(0)).unwrap();
+    let joint = |name: &str| {
+        clip.skeleton
+            .index_of(&format!("mixamorig:{name}"))
+            .unwrap()
+    };
+    let (finger, spine) = (joint("LeftHandIndex1"), joint("Spine"));
     let mut channels = channel_layout(&clip, [Axis::Z, Axis::X, Axis::Y]);
-    channels[finger].clear();
-    channels[spine].clear();
-    bvh::write(&own, &Bvh::from_clip(&clip, channels.clone()).unwrap()).unwrap();
-    let mut command = keydance();
-    command
-        .arg("generate")
-        .arg(config())
-        .arg("--motion")
-        .arg(&own);
-    command.args(["--keyframes", "0,75", "--out"]).arg(&dance);
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", stderr(&output));
-    let made = bvh::read(&dance).unwrap();
-    assert_eq!(made.channels()[finger], []);
-    let rotations = made.channels()[spine].iter();
-    let rotations = rotations.filter(|it| matches!(it, Channel::Rotation(_)));
-    assert!([0, 3].contains(&rotations.count()));
+    for joint in [finger, spine] {
+        clip.poses
+            .iter_mut()
+            .for_each(|pose| pose.rotations[joint] = DQuat::IDENTITY);
+        channels[joint].clear();
+    }
+    let stiff = Bvh::from_clip(&clip, channels).unwrap();
+    bvh::write(&path("stiff.bvh"), &stiff).unwrap();
+    let made = danced(
+        folder.path(),
+        &["--motion", "stiff.bvh", "--keyframes", "0,75"],
+    );
+    assert_eq!(
+        made.channels()[made
+            .skeleton()
+            .index_of("mixamorig:LeftHandIndex1")
+            .unwrap()],
+        []
+    );
+    let keyframes = [
+        "--keyframe",
+        "stiff.bvh:0@0",
+        "--keyframe",
+        "turns.bvh:50@50",
+        "--force",
+    ];
+    let made = danced(folder.path(), &keyframes);
+    let spine = made.skeleton().index_of("mixamorig:Spine").unwrap();
+    let rotations = [Axis::Z, Axis::X, Axis::Y].map(Channel::Rotation);
+    assert_eq!(made.channels()[spine], rotations);
+}
+
+#[test]
+fn a_joint_that_turns_about_one_axis_is_said_to_turn_about_three() {
+    let folder = TempDir::new().unwrap();
+    let document = own_clip(0);
+    let knee = document.skeleton().index_of("mixamorig:LeftLeg").unwrap();
+    let before: usize = document.channels()[..knee].iter().map(Vec::len).sum();
+    let mut channels = document.channels().to_vec();
+    channels[knee].truncate(1);
+    let columns: Vec<usize> = (0..document.motion().ncols())
+        .filter(|column| ![before + 1, before + 2].contains(column))
+        .collect();
+    let motion = document.motion().select(ndarray::Axis(1), &columns);
+    let skeleton = document.skeleton().clone();
+    let bent = Bvh::new("own.bvh".into(), skeleton, channels, 1.0 / FPS, motion).unwrap();
+    bvh::write(&folder.path().join("own.bvh"), &bent).unwrap();
+    let said = stderr(&generate(
+        folder.path(),
+        &["--motion", "own.bvh", "--keyframes", "0,75"],
+    ));
+    assert!(
+        said.contains("turns about three in the result: mixamorig:LeftLeg"),
+        "{said}"
+    );
+    let made = bvh::read(&folder.path().join("dance.bvh")).unwrap();
+    let knee = made.skeleton().index_of("mixamorig:LeftLeg").unwrap();
+    assert_eq!(made.channels()[knee].len(), 3);
 }
 
 #[test]
@@ -275,22 +306,11 @@ fn a_rig_that_is_not_recognised_is_mapped_by_a_file_that_the_program_began() {
         .to_text()
         .replace("mixamorig:LeftForeArm", "tentacle");
     fs::write(path("own.bvh"), text).unwrap();
-    let generate = |more: &[&str]| {
-        let mut command = keydance();
-        command
-            .current_dir(folder.path())
-            .args(["generate", &config()]);
-        command.args([
-            "--motion",
-            "own.bvh",
-            "--keyframes",
-            "0,75",
-            "--out",
-            "dance.bvh",
-        ]);
-        command.args(more).output().unwrap()
+    let generated = |more: &[&str]| {
+        let keyframes = ["--motion", "own.bvh", "--keyframes", "0,75"];
+        generate(folder.path(), &[&keyframes, more].concat())
     };
-    let refused = generate(&[]);
+    let refused = generated(&[]);
     assert!(!refused.status.success());
     let said = stderr(&refused);
     assert!(
@@ -317,7 +337,7 @@ fn a_rig_that_is_not_recognised_is_mapped_by_a_file_that_the_program_began() {
     assert!(!kept.is_empty() && kept.iter().all(|line| lines.contains(line)));
     fs::write(path("map.toml"), lines).unwrap();
     assert!(Mapping::read(&path("map.toml")).is_ok());
-    let output = generate(&["--mapping", "map.toml"]);
+    let output = generated(&["--mapping", "map.toml"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let made = bvh::read(&path("dance.bvh")).unwrap();
     assert!(made.skeleton().index_of("tentacle").is_some());
@@ -325,25 +345,34 @@ fn a_rig_that_is_not_recognised_is_mapped_by_a_file_that_the_program_began() {
 
 #[test]
 fn completions_and_man_pages_know_every_command() {
+    let commands = Cli::command();
+    let names: Vec<&str> = commands.get_subcommands().map(|it| it.get_name()).collect();
+    assert!(names.len() > 20);
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let output = keydance().args(["completions", shell]).output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
-        assert!(
-            text.contains("generate") && text.contains("keyframes"),
-            "{shell}"
-        );
+        let unknown: Vec<&&str> = names.iter().filter(|name| !text.contains(**name)).collect();
+        assert!(unknown.is_empty(), "{shell}: {unknown:?}");
     }
     let folder = TempDir::new().unwrap();
     let pages = folder.path().join("man/man1");
-    assert!(
+    let man = |more: &[&str]| {
         keydance()
             .arg("man")
             .arg(&pages)
-            .status()
+            .args(more)
+            .output()
             .unwrap()
-            .success()
-    );
-    let page = |name: &str| fs::read_to_string(Path::new(&pages).join(name)).unwrap();
-    assert!(page("keydance.1").contains("keydance"));
-    assert!(page("keydance-generate.1").contains("keyframes"));
+    };
+    assert!(man(&[]).status.success());
+    for name in names {
+        let page = fs::read_to_string(pages.join(format!("keydance-{name}.1"))).unwrap();
+        assert!(page.contains("keydance"), "{name}");
+    }
+    let main = pages.join("keydance.1");
+    fs::write(&main, "another").unwrap();
+    assert!(stderr(&man(&[])).contains("--force replaces it"));
+    assert_eq!(fs::read_to_string(&main).unwrap(), "another");
+    assert!(man(&["--force"]).status.success());
+    assert_ne!(fs::read_to_string(&main).unwrap(), "another");
 }

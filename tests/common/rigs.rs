@@ -14,7 +14,7 @@ pub struct Rig {
     joints: &'static str,
 }
 
-pub const RIGS: [Rig; 11] = [
+pub const RIGS: [Rig; 12] = [
     Rig {
         name: "mixamo",
         sides: ["Left", "Right"],
@@ -145,6 +145,25 @@ pub const RIGS: [Rig; 11] = [
             %Hand %ForeArm %Hand
             %FingerBase %Hand -
             %HandIndex1 %FingerBase -",
+    },
+    Rig {
+        name: "lafan1",
+        sides: ["Left", "Right"],
+        joints: "
+            Hips . Hips
+            %UpLeg Hips %UpLeg
+            %Leg %UpLeg %Leg
+            %Foot %Leg %Foot
+            %Toe %Foot %ToeBase
+            Spine Hips Spine
+            Spine1 Spine Spine1
+            Spine2 Spine1 Spine2,Spine3,Spine4
+            Neck Spine2 Neck
+            Head Neck Head
+            %Shoulder Spine2 %Shoulder
+            %Arm %Shoulder %Arm
+            %ForeArm %Arm %ForeArm
+            %Hand %ForeArm %Hand",
     },
     Rig {
         name: "bandai_namco",

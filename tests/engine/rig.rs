@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DQuat, DVec3};
-use keydance::motion::rig::{Rig, RigKeyframe, nearest_frames, onto_rig, retime};
+use keydance::motion::rig::{Rig, RigKeyframe, nearest_frames, onto_rig, spread};
 use keydance::motion::{
     Clip, Conversion, DANCE_JOINTS, Mapping, Pose, Recognised, Skeleton, Unit, Up,
 };
@@ -84,10 +84,9 @@ fn the_mapping_files_that_come_with_it_are_what_is_recognised() {
         ("perception_neuron", "perception_neuron"),
         ("bandai_namco", "bandai_namco"),
         ("rigify", "rigify"),
+        ("lafan1", "lafan1"),
     ] {
-        let rig = RIGS.iter().find(|it| it.name == rig).unwrap();
-        let body = rig.body();
-        let clip = moving(&body.skeleton, 2);
+        let clip = clip_of(rig);
         let shipped = Mapping::read(&folder.join(format!("{file}.toml"))).unwrap();
         let own = Mapping::recognised(&clip).unwrap();
         assert_eq!(
@@ -95,6 +94,28 @@ fn the_mapping_files_that_come_with_it_are_what_is_recognised() {
             own.apply(&clip).unwrap(),
             "{file}"
         );
+    }
+}
+
+/// Two frames on one of the rigs.
+fn clip_of(rig: &str) -> Clip {
+    let rig = RIGS.iter().find(|it| it.name == rig).unwrap();
+    moving(&rig.body().skeleton, 2)
+}
+
+#[test]
+fn the_mapping_of_the_cmu_clips_spreads_a_spine_of_two_joints_and_finds_all_others() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/mappings");
+    let clip = clip_of("cmu_43");
+    let shipped = Mapping::read(&folder.join("cmu.toml")).unwrap();
+    let own = Mapping::recognised(&clip).unwrap();
+    let [shipped, own] = [shipped, own].map(|it| it.apply(&clip).unwrap());
+    for (a, b) in shipped.poses.iter().zip(&own.poses) {
+        let [a, b] = [a, b].map(|pose| pose.world_positions(&own.skeleton));
+        for (joint, name) in DANCE_JOINTS.iter().enumerate() {
+            let apart = a[joint].distance(b[joint]);
+            assert_eq!(apart > 1e-9, name.starts_with("Spine"), "{name}: {apart}");
+        }
     }
 }
 
@@ -201,14 +222,15 @@ fn fingers_go_from_their_pose_at_one_keyframe_to_that_at_the_next() {
 #[test]
 fn another_rate_keeps_keyframes_on_whole_frames() {
     let clip = moving(&RIGS[0].body().skeleton, 62);
-    let own = retime(clip.clone(), &[0, 31, 61], 1.0 / 24.0);
     let times = nearest_frames(&[0, 31, 61], 0.8);
     assert_eq!(times, [0, 25, 49]);
+    let own = spread(clip.clone(), &[0, 31, 61], &times, 1.0 / 24.0);
     assert_eq!((own.poses.len(), own.frame_time), (50, 1.0 / 24.0));
     for (new, old) in times.into_iter().zip([0, 31, 61]) {
         assert_eq!(own.poses[new], clip.poses[old], "frame {new}");
     }
-    let fine = retime(clip.clone(), &[0, 61], 1.0 / 120.0);
+    let fine = spread(clip.clone(), &[0, 61], &[0, 244], 1.0 / 120.0);
+    assert_eq!(nearest_frames(&[3, 4, 5], 0.2), [1, 2, 3]);
     assert_eq!(fine.poses.len(), 245);
     assert_eq!(fine.poses[40], clip.poses[10]);
 }
