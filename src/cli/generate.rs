@@ -28,16 +28,19 @@ use velocity::VelocityArgs;
 ///
 /// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a
 /// file at another rate is resampled first, so frame 120 of the file's own 120 a second is frame 30
-/// here. The result passes through every keyframe. Keyframes of several dancers are put onto the
-/// first one's bones.
+/// here; --own-frames counts as the file does. The result passes through every keyframe. Keyframes
+/// of several dancers are put onto the first one's bones.
+///
+/// Keyframes on a rig other than the dance skeleton are recognised by the names of its joints
+/// (keydance rig prints how), and the result is on that rig, in its file's unit, axis and rate.
 ///
 /// Which controls change the motion depends on the model, as each reads its own: interpolation, for
 /// one, the keyframes alone. A control that the model does not read gets a warning; one that it
 /// needs and does not get is an error.
 #[derive(Debug, Args)]
 pub struct GenerateArgs {
-    /// Folder of a run, or the config of a model that needs no training [default: a model that comes
-    /// with the program, between keyframes or to --music]
+    /// Folder of a run, or the config of a model that needs no training [default: a model that
+    /// comes with the program, between keyframes or to --music]
     #[arg(value_name = "RUN_DIR_OR_CONFIG")]
     run: Option<PathBuf>,
     #[command(flatten)]

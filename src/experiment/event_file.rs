@@ -1,7 +1,7 @@
 //! What trainings logged as event files, which TensorBoard shows.
 //!
-//! A file is a row of records: the length of the content (u64), its masked CRC-32C, the content, its
-//! masked CRC-32C, all little-endian. A content is TensorFlow's protobuf message `Event`.
+//! A file is a row of records: the length of the content (u64), its masked CRC-32C, the content,
+//! its masked CRC-32C, all little-endian. A content is TensorFlow's protobuf message `Event`.
 
 use std::path::{Path, PathBuf};
 

@@ -326,21 +326,15 @@ impl Mapping {
     /// of several at its place the last, which carries what hangs on them; for a joint that points
     /// lie between, the nearest of these; none for a joint that the mapping does not name.
     pub fn turned_as(&self, rig: &Skeleton) -> Vec<Option<usize>> {
-        let turned_as = |joint: &Joint| {
-            let shares = self.sources.iter().map(|source| source.share_of(joint));
-            let shares = shares.enumerate();
-            let nearest = shares.max_by(|a, b| a.1.total_cmp(&b.1));
-            nearest.filter(|(_, share)| *share > 0.0).map(|(at, _)| at)
-        };
+        let sources = self.sources.iter();
+        let turned_as = |joint| nearest(sources.clone().map(|source| source.share_of(joint)));
         rig.joints.iter().map(turned_as).collect()
     }
 
     /// The joint of a rig that stands for the hips, or is next to them.
     pub fn hips(&self, rig: &Skeleton) -> Option<usize> {
         let hips = self.sources.first()?;
-        let shares = rig.joints.iter().map(|joint| hips.share_of(joint));
-        let nearest = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        nearest.filter(|(_, share)| *share > 0.0).map(|(at, _)| at)
+        nearest(rig.joints.iter().map(|joint| hips.share_of(joint)))
     }
 
     /// For each joint of another skeleton the joint of the dance skeleton that stands at its place,
@@ -509,6 +503,13 @@ impl From<Mapping> for MappingFile {
                 .collect(),
         }
     }
+}
+
+/// The place of the largest share, the last of several; none where there is no share.
+fn nearest(shares: impl Iterator<Item = f64>) -> Option<usize> {
+    let largest = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    let (at, share) = largest?;
+    (share > 0.0).then_some(at)
 }
 
 /// Finds `joint`, `joint/End Site` or `joint/End Site 2`.

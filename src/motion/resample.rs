@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use super::clip::{Clip, Pose};
 
-/// Files round their frame times (0.0333333, 0.00833333): a rate, or a ratio of rates, this close to
-/// a whole number is that number.
+/// Files round their frame times (0.0333333, 0.00833333): a rate, or a ratio of rates, this close
+/// to a whole number is that number.
 const ROUNDING: f64 = 1e-4;
 /// How many new frames one old frame may become.
 const FINEST: f64 = 120.0;

@@ -12,6 +12,7 @@ pub mod controls;
 mod dance;
 mod error;
 mod foot_cleanup;
+mod keyframe_choice;
 pub mod keyframes;
 mod motion;
 mod own_frames;

@@ -6,7 +6,7 @@ use crate::counted::counted;
 use crate::data::{DataConfig, DataError, RigReading};
 use crate::motion::bvh::{Axis, Bvh, Channel};
 use crate::motion::rig::{Rig, RigKeyframe, onto_rig};
-use crate::motion::{Clip, Mapping, Pose};
+use crate::motion::{Clip, Joint, Mapping, Pose};
 
 /// How far a joint without rotation channels may turn, rad.
 const UNTURNED: f64 = 1e-6;
@@ -59,13 +59,9 @@ impl OwnRig {
 
     /// Whether another file is of the same rig.
     pub fn is_same(&self, other: &Self) -> bool {
-        let joints = |rig: &Self| -> Vec<(String, Option<usize>)> {
-            let joints = rig.rig.skeleton.joints.iter();
-            joints
-                .map(|joint| (joint.name.clone(), joint.parent))
-                .collect()
-        };
-        joints(self) == joints(other)
+        let [own, other] = [self, other].map(|rig| rig.rig.skeleton.joints.iter());
+        let key = |joint: &Joint| (joint.name.clone(), joint.parent);
+        own.map(key).eq(other.map(key))
     }
 
     /// What is to be known of a result on it.
@@ -90,8 +86,8 @@ impl OwnRig {
             more => format!(" and {more} more"),
         };
         Some(format!(
-            "{first}{others} turn about one or two axes in the file, and about all three in the \
-             result"
+            "what turns about one or two axes in the file turns about three in the result: \
+             {first}{others}"
         ))
     }
 

@@ -7,4 +7,4 @@ mod retime;
 
 pub use onto_rig::{Rig, RigKeyframe, onto_rig};
 pub use recognise::Recognised;
-pub use retime::{nearest_frames, retime, spread};
+pub use retime::{nearest_frames, spread};

@@ -223,8 +223,8 @@ impl<'s> Body<'s> {
         self.upwards(one).find(|joint| above.contains(joint))
     }
 
-    /// The joints from the hips up to where the arms begin, without the hips and a neck that carries
-    /// the arms; the hips alone where there are no others.
+    /// The joints from the hips up to where the arms begin, without the hips and a neck that
+    /// carries the arms; the hips alone where there are no others.
     fn trunk(&self, hips: usize, chest: usize) -> Option<Vec<usize>> {
         let fork = self.meeting(hips, chest)?;
         let spine = self.upwards(chest).take_while(|&it| it != fork);
@@ -240,8 +240,8 @@ impl<'s> Body<'s> {
         self.names[joint].is(None, &[Part::Neck])
     }
 
-    /// The head by its name, or else the end of the chain of joints called as the chest that goes on
-    /// from it; the neck is the first joint on the way to it that is called so, or else the first.
+    /// The head by its name, or else the end of the chain of joints called as the chest that goes
+    /// on from it; the neck is the first joint on the way to it that is called so, or else the first.
     fn neck_and_head(&self, chest: usize) -> Option<(usize, usize)> {
         let hangs = |&joint: &usize| self.upwards(joint).skip(1).any(|above| above == chest);
         let mut heads = self.uppermost(None, &[Part::Head]).filter(hangs);

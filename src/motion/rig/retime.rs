@@ -2,15 +2,8 @@
 
 use crate::motion::{Clip, Pose};
 
-/// The clip with a frame every `frame_time` seconds, its frames `keyframes` (ascending, the first
-/// of them 0) each on the nearest new frame, whole: between two of them time runs as much slower or
-/// faster as that takes.
-pub fn retime(clip: Clip, keyframes: &[usize], frame_time: f64) -> Clip {
-    let times = nearest_frames(keyframes, clip.frame_time / frame_time);
-    spread(clip, keyframes, &times, frame_time)
-}
-
-/// The frames nearest to given ones (ascending) where there are `ratio` times as many, each another.
+/// The frames nearest to given ones (ascending) where there are `ratio` times as many, each of them
+/// another.
 pub fn nearest_frames(frames: &[usize], ratio: f64) -> Vec<usize> {
     let mut nearest: Vec<usize> = Vec::with_capacity(frames.len());
     for &frame in frames {
@@ -21,8 +14,8 @@ pub fn nearest_frames(frames: &[usize], ratio: f64) -> Vec<usize> {
 }
 
 /// The clip with a frame every `frame_time` seconds and its frames `keyframes` as the new frames
-/// `times`, whole: both ascend, and `times` from 0. Between two of them its poses are spread
-/// evenly.
+/// `times`, whole: both ascend, and `times` from 0. Between two of them time runs as much slower or
+/// faster as that takes.
 pub fn spread(clip: Clip, keyframes: &[usize], times: &[usize], frame_time: f64) -> Clip {
     let mut poses: Vec<Pose> = Vec::new();
     for (from, new) in keyframes.windows(2).zip(times.windows(2)) {

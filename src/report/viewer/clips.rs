@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{MotionKind, Viewer, ViewerBody, ViewerMotion};
-use crate::data::{DataConfig, FileReading, at_its_rate};
+use crate::data::{DataConfig, DataError, FileReading, at_its_rate};
 use crate::models::transition::DanceClip;
 use crate::motion::{Clip, Mapping, bvh};
 use crate::report::ReportError;
@@ -12,7 +12,7 @@ use crate::report::ReportError;
 const SAME_RATE: f64 = 1e-4;
 
 /// The page of clips from files, HTML, and what is to be known of the files. All are shown at the
-/// first one's rate; where they are rigs of persons on the dance skeleton's joints, else on their
+/// first one's rate; where all are rigs of persons on the dance skeleton's joints, else on their
 /// own, which is one for all then. A clip that ends earlier than others stands still.
 ///
 /// # Errors
@@ -22,10 +22,13 @@ pub fn clips_page(
     data: &DataConfig,
 ) -> Result<(String, Vec<String>), ReportError> {
     let mut notices = Vec::new();
+    let mut note = |clip: &Clip, odd: Vec<String>| {
+        notices.extend(odd.iter().map(|notice| format!("{}: {notice}", clip.name)));
+    };
     let mut clips: Vec<Clip> = Vec::new();
     for file in files {
         let (clip, odd) = at_its_rate(bvh::read(file)?.to_clip(), data)?;
-        notices.extend(odd.iter().map(|notice| format!("{}: {notice}", clip.name)));
+        note(&clip, odd);
         clips.push(clip);
     }
     let nothing = || ReportError::Refused("there is no clip to show".into());
@@ -36,67 +39,42 @@ pub fn clips_page(
         skip_frames: 0,
         ..data.clone()
     };
-    let mappings: Result<Vec<_>, _> = clips
-        .iter()
-        .map(|clip| Mapping::onto_dance_skeleton(clip, data.mapping.as_ref()))
-        .collect();
-    let mut read = |clip: Clip, mapping: Option<&Mapping>| -> Result<Clip, ReportError> {
-        let reading = FileReading::of(clip, mapping, &at_rate)?;
-        let clip = reading.recording.clip;
-        let odd = reading.notices.iter();
-        notices.extend(odd.map(|notice| format!("{}: {notice}", clip.name)));
-        Ok(clip)
-    };
-    let mapped = mappings.is_ok();
-    let shown: Vec<Clip> = match &mappings {
-        Ok(mappings) => {
-            let pairs = clips.iter().zip(mappings);
-            let read = pairs.map(|(clip, mapping)| read(clip.clone(), mapping.as_deref()));
-            read.collect::<Result<_, _>>()?
-        }
-        Err(unknown) => {
-            let same = |clip: &Clip| clip.skeleton == clips[0].skeleton;
-            if !clips.iter().all(same) {
-                let problem =
-                    format!("clips on several skeletons are not shown together: {unknown}");
-                return Err(ReportError::Refused(problem));
-            }
-            let read = clips.iter().map(|clip| read(clip.clone(), None));
-            read.collect::<Result<_, _>>()?
-        }
-    };
+    let mappings = mappings(&clips, data.mapping.as_ref())?;
+    let title: Vec<String> = clips.iter().map(|clip| clip.name.clone()).collect();
+    let mut shown: Vec<Clip> = Vec::new();
+    for (number, clip) in clips.into_iter().enumerate() {
+        let mapping = mappings.as_ref().and_then(|all| all[number].as_ref());
+        let FileReading { recording, notices } = FileReading::of(clip, mapping, &at_rate)?;
+        note(&recording.clip, notices);
+        shown.push(recording.clip);
+    }
     let longest = shown.iter().map(|clip| clip.poses.len()).max().unwrap_or(0);
+    let body = match &mappings {
+        Some(_) => ViewerBody::dance(),
+        None => ViewerBody::of(&shown[0].skeleton),
+    };
     let mut motions = Vec::new();
-    for (number, mut clip) in shown.into_iter().enumerate() {
-        let last = clip.poses.last().cloned();
-        clip.poses.resize_with(longest, || {
-            last.clone().unwrap_or_else(|| clip.skeleton.rest_pose())
-        });
-        let kind = match number {
+    for mut clip in shown {
+        let kind = match motions.len() {
             0 => MotionKind::Recorded,
             _ => MotionKind::Other,
         };
-        motions.push(match mapped {
-            true => {
-                let name = clip.name.clone();
+        if let Some(last) = clip.poses.last().cloned() {
+            clip.poses.resize(longest, last);
+        }
+        let name = clip.name.clone();
+        motions.push(match &mappings {
+            Some(_) => {
                 let measured = DanceClip::measure(clip, &at_rate.features());
-                let measured = measured.map_err(crate::data::DataError::from)?;
+                let measured = measured.map_err(DataError::from)?;
                 ViewerMotion::from_features(name, kind, measured.features.view())
             }
-            false => {
-                let still = vec![[false; 4]; longest];
-                ViewerMotion::from_clip(clip.name.clone(), kind, &clip, still)
-            }
+            None => ViewerMotion::from_clip(name, kind, &clip, vec![[false; 4]; longest]),
         });
     }
-    let body = match mapped {
-        true => ViewerBody::dance(),
-        false => ViewerBody::of(&clips[0].skeleton),
-    };
     let counts_alike = (data.fps * frame_time - 1.0).abs() < SAME_RATE;
-    let names: Vec<&str> = clips.iter().map(|clip| clip.name.as_str()).collect();
     let viewer = Viewer {
-        title: names.join(", "),
+        title: title.join(", "),
         frame_time,
         body,
         motions,
@@ -109,4 +87,24 @@ pub fn clips_page(
         }),
     };
     Ok((viewer.html()?, notices))
+}
+
+/// What brings each clip onto the dance skeleton, none for one that is on it; none at all where a
+/// clip cannot be brought there and all are on one skeleton.
+fn mappings(
+    clips: &[Clip],
+    given: Option<&Mapping>,
+) -> Result<Option<Vec<Option<Mapping>>>, ReportError> {
+    let onto = |clip| Ok(Mapping::onto_dance_skeleton(clip, given)?.map(|it| it.into_owned()));
+    let found: Result<_, DataError> = clips.iter().map(onto).collect();
+    let is_one = clips
+        .windows(2)
+        .all(|pair| pair[0].skeleton == pair[1].skeleton);
+    match found {
+        Ok(mappings) => Ok(Some(mappings)),
+        Err(_) if is_one => Ok(None),
+        Err(unknown) => Err(ReportError::Refused(format!(
+            "clips on several skeletons are not shown together: {unknown}"
+        ))),
+    }
 }

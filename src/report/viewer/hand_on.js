@@ -18,7 +18,7 @@ async function copy(text, button) {
     await navigator.clipboard.writeText(text);
     button.dataset.done = "copied";
   } catch {
-    // A page from disk may not be let at the clipboard; then the text is there to be copied by hand.
+    // A page from disk may not be let at the clipboard; then the text can be copied by hand.
     button.dataset.done = "select and copy";
     const field = element("picked");
     [field.hidden, field.value] = [false, text];
