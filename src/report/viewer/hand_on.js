@@ -13,16 +13,13 @@ function pick() {
   refresh();
 }
 
-async function copy(text, button) {
+/** Copies a text; a page from disk may not be let at the clipboard, then says what is to do. */
+async function copy(text, button, otherwise) {
   try {
     await navigator.clipboard.writeText(text);
     button.dataset.done = "copied";
   } catch {
-    // A page from disk may not be let at the clipboard; then the text can be copied by hand.
-    button.dataset.done = "select and copy";
-    const field = element("picked");
-    [field.hidden, field.value] = [false, text];
-    field.select();
+    button.dataset.done = otherwise;
   }
   setTimeout(() => delete button.dataset.done, 1500);
 }
@@ -33,7 +30,7 @@ function link() {
   asked.set("frame", Math.round(time.frame));
   if (look.arrangement === "overlay") asked.set("view", "overlay");
   history.replaceState(null, "", `#${asked}`);
-  copy(location.href, element("link"));
+  copy(location.href, element("link"), "in the address bar");
 }
 
 let film = null;
@@ -71,7 +68,10 @@ function filmed() {
 function listenToHandOn() {
   element("pick").hidden = !data.picks;
   element("pick").addEventListener("click", pick);
-  element("copy").addEventListener("click", () => copy(element("picked").value, element("copy")));
+  element("copy").addEventListener("click", () => {
+    element("picked").select();
+    copy(element("picked").value, element("copy"), "selected");
+  });
   element("link").addEventListener("click", link);
   element("record").hidden = !(window.MediaRecorder && sceneCanvas.captureStream);
   element("record").addEventListener("click", record);
