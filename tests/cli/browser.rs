@@ -40,8 +40,22 @@ pub struct Loaded {
     pub log: String,
 }
 
-/// Opens a file, with `hash` behind it in the address, and lets it run for `milliseconds`.
-pub fn load(browser: &Path, page: &Path, hash: &str, milliseconds: u32) -> Loaded {
+/// Opens a file, with `hash` behind it in the address, and lets it run until it is `ready`.
+///
+/// A browser's clock runs ahead of a busy machine and may reach its end before the first repaint:
+/// a page that is not ready is loaded again for twice as long, and the last one is given back.
+pub fn load(browser: &Path, page: &Path, hash: &str, ready: impl Fn(&Loaded) -> bool) -> Loaded {
+    let mut loaded = load_for(browser, page, hash, 1000);
+    for milliseconds in [2000, 4000, 8000, 16_000] {
+        if ready(&loaded) {
+            break;
+        }
+        loaded = load_for(browser, page, hash, milliseconds);
+    }
+    loaded
+}
+
+fn load_for(browser: &Path, page: &Path, hash: &str, milliseconds: u32) -> Loaded {
     let profile = TempDir::new().unwrap();
     let output = Command::new(browser)
         .args([
@@ -68,6 +82,11 @@ pub fn load(browser: &Path, page: &Path, hash: &str, milliseconds: u32) -> Loade
 }
 
 impl Loaded {
+    /// Whether the page has drawn a frame, or an error ended it.
+    pub fn has_drawn(&self) -> bool {
+        ["data-frame", "data-error"].map(|name| self.attribute(name).is_some()) != [false; 2]
+    }
+
     /// Value of an attribute of the document's root element.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         let root = &self.document[self.document.find("<html")?..];

@@ -12,7 +12,7 @@ use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::browser;
+use crate::browser::{self, Loaded};
 use crate::trained_run::keydance;
 use crate::viewer_page::page_data;
 
@@ -320,7 +320,7 @@ fn the_viewer_plays_the_song_where_it_is_or_holds_it_where_asked() {
         return;
     };
     let file = folder.path().join("held.html");
-    let loaded = browser::load(&browser, &file, "#frame=120", 800);
+    let loaded = browser::load(&browser, &file, "#frame=120", Loaded::has_drawn);
     assert_eq!(loaded.attribute("data-error"), None, "{}", loaded.log);
     assert_eq!(
         loaded.attribute("data-music"),

@@ -10,7 +10,7 @@ use predicates::str::contains;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::browser;
+use crate::browser::{self, Loaded};
 use crate::trained_run::keydance;
 
 /// Folders of generated dances: `first` and `second` with one name a dance, music beside the first.
@@ -246,7 +246,7 @@ fn what_makes_no_study_is_said_and_nothing_is_written() {
 
 /// Runs the page with a script of a participant's behind its own; what the script leaves in an
 /// element `left`.
-fn driven(browser: &Path, page: &Path, script: &str) -> (browser::Loaded, String) {
+fn driven(browser: &Path, page: &Path, script: &str) -> (Loaded, String) {
     let text = fs::read_to_string(page).unwrap();
     let script = format!(
         "<script type=\"module\">
@@ -268,8 +268,9 @@ fn driven(browser: &Path, page: &Path, script: &str) -> (browser::Loaded, String
     );
     let driven = page.with_file_name("driven.html");
     fs::write(&driven, text.replace("</body>", &script)).unwrap();
-    let loaded = browser::load(browser, &driven, "", 3000);
     let begin = "<pre id=\"left\">";
+    let has_left = |page: &Loaded| page.document.contains(begin);
+    let loaded = browser::load(browser, &driven, "", has_left);
     let start = loaded.document.find(begin).expect(&loaded.log) + begin.len();
     let end = start + loaded.document[start..].find("</pre>").unwrap();
     let left = loaded.document[start..end].to_string();
