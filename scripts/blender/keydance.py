@@ -1020,7 +1020,7 @@ class KeydanceSettings(bpy.types.PropertyGroup):
         description="How much higher the root goes halfway between two keyed poses",
     )
     foot_cleanup: BoolProperty(
-        name="Hold Feet", description="Hold feet still where the model has them on the ground"
+        name="Hold Feet", description="Hold feet still where they are on the ground, and above it"
     )
     mapping: StringProperty(
         name="Mapping",

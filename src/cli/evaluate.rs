@@ -38,8 +38,8 @@ pub struct EvaluateArgs {
     /// comparable with scores on all of them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     windows: Option<u32>,
-    /// Ways of counting to score by, instead of all that the model's paper has (they are listed
-    /// below)
+    /// Ways of counting to score by, instead of all that the tables of the model's paper have (they
+    /// are listed below)
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
     protocol: Vec<String>,
     /// Write the scores here, too; a run's folder gets those of its own model by all protocols, on

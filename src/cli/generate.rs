@@ -67,7 +67,9 @@ pub struct GenerateArgs {
     /// which: key_pose_retrieval
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Pin the feet where the model predicts contact
+    /// Pin the feet where they stand on the floor, and lift them where they are below it: the floor
+    /// is as low as the feet come from the first keyframe of --motion to the last, or in the files
+    /// of the keyframes
     #[arg(long)]
     foot_cleanup: bool,
     /// Show the motion beside interpolation and, where keyframes come from --motion at their own

@@ -4,6 +4,8 @@
 #[cfg(feature = "papers")]
 pub mod equations;
 #[cfg(feature = "papers")]
+pub mod exports;
+#[cfg(feature = "papers")]
 pub mod frechet;
 #[cfg(feature = "papers")]
 pub mod in_betweening;

@@ -165,6 +165,12 @@ impl ExperimentConfig {
         paper.map_or(Vec::new(), |paper| (paper.protocols)(&self.data, options))
     }
 
+    /// Further ways to score it, which no table has.
+    pub fn protocols_by_name(&self, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
+        let paper = self.paper();
+        paper.map_or(Vec::new(), |paper| (paper.by_name)(&self.data, options))
+    }
+
     /// What its paper prints.
     ///
     /// # Errors

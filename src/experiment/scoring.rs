@@ -55,7 +55,10 @@ impl<'s> Scoring<'s> {
             force,
         } = choice;
         let data = EvaluatedData::of(dataset, *part)?;
-        let protocols = subject.config.protocols_with(options);
+        let mut protocols = subject.config.protocols_with(options);
+        if !names.is_empty() {
+            protocols.extend(subject.config.protocols_by_name(options));
+        }
         let folder = subject.scores_folder(out.as_deref(), &data, *force)?;
         let whole = *options == EvaluationOptions::default() && names.is_empty();
         let is_kept = match &subject.run {

@@ -35,6 +35,8 @@ pub struct Paper {
     /// How its tables score a model, for data that is read like this. The first protocol also
     /// scores a training on validation clips.
     pub protocols: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,
+    /// Further ways to score one, which no table has: only where they are asked for by name.
+    pub by_name: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,
 }
 
 /// A kind of model: what a config's `model.kind` names.

@@ -1,34 +1,40 @@
-//! Feet that stand still where contact is predicted.
+//! Feet that stand still on the floor, and never go through it.
 //!
-//! Heel (the ankle joint) and toe are pinned each by its own labels. In a run of frames in contact
-//! the joint is held at one place; before and after, the correction comes and goes along a smooth
-//! curve. The leg follows by two-bone inverse kinematics, and the foot turns where heel and toe are
-//! both held. A run over a keyframe holds the joint where the keyframe has it; one over several
-//! keyframes is split between them; near a keyframe outside the run the correction fades. So no
-//! keyframe changes. A joint that is predicted to slide far in one contact is held at one place
-//! after another: it steps instead.
+//! A foot joint, heel (the ankle joint) or toe, that is near the floor and slow stands: in a run of
+//! such frames it is held at one place; before and after, the correction comes and goes along a
+//! smooth curve. What is below the floor is lifted onto it, smoothly, too. The leg follows by
+//! two-bone inverse kinematics, and the foot turns to where its toe is held. A run over a keyframe
+//! holds the joint where the keyframe has it; one over several keyframes is split between them; near
+//! a keyframe outside the run the correction fades. So no keyframe changes. A joint that slides far
+//! in one contact is held at one place after another: it steps instead.
+
+use std::ops::Range;
 
 use glam::{DQuat, DVec3};
 
 use crate::motion::ik::two_bone;
-use crate::motion::{Pose, Skeleton};
+use crate::motion::{Feet, Floor, ON_FLOOR, Pose, Skeleton};
 
 /// Frames over which a correction comes before a contact and goes after it.
-const EASE: usize = 6;
-/// A contact of fewer frames is noise in the labels.
+const EASE: usize = 8;
+/// Frames over which what is left of a lift comes and goes once the joints are held.
+const LAST_EASE: usize = 2;
+/// A joint that is faster than this from both neighbouring frames does not stand, cm/frame.
+const SLOW: f64 = 3.0;
+/// A contact of fewer frames is noise.
 const SHORTEST: usize = 3;
-/// Gaps in a contact up to this many frames are noise in the labels.
+/// Gaps in a contact up to this many frames are noise.
 const GAP: usize = 2;
 /// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held
 /// at another place from then on.
 const HELD: f64 = 25.0;
+/// From this share of its length on a leg is stretched less than a place asks: before it is straight
+/// its knee snaps.
+const SOFT: f64 = 0.97;
 /// Corrections below this are none, cm.
 const STILL: f64 = 1e-9;
 /// Bones below this have no direction, cm.
 const SHORTEST_BONE: f64 = 1e-6;
-
-/// Ankles and toes, in the order of the contact labels.
-const FEET: [[&str; 2]; 2] = [["LeftFoot", "LeftToeBase"], ["RightFoot", "RightToeBase"]];
 
 /// Frames `from..to` in which a joint stands, and the keyframe among them whose place it keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,55 +48,98 @@ struct Stand {
 struct Hold {
     /// How far it is moved, `[F]`, cm; already faded.
     correction: Vec<DVec3>,
-    /// How much it is held, `[F]`, 0 to 1.
+    /// How much it stands, `[F]`, 0 to 1.
     weight: Vec<f64>,
 }
 
-/// Pins the feet of `poses`, `[F]`, in the frames of `contacts`; frames in `keyframes` (ascending)
-/// keep their poses.
+/// Pins the feet of `poses`, `[F]`, where they stand on a floor, and lifts them where they are below
+/// it; frames in `keyframes` (ascending) keep their poses. No keyframe's feet are below the floor.
 pub(super) fn pin_feet(
     skeleton: &Skeleton,
     poses: &mut [Pose],
-    contacts: &[[bool; 4]],
+    feet: &Feet,
+    floor: &Floor,
     keyframes: &[usize],
 ) {
-    for (foot, names) in FEET.iter().enumerate() {
-        let Some(leg) = leg(skeleton, names) else {
+    for (ankle, toe) in feet.ankles.into_iter().zip(feet.toes) {
+        let Some(leg) = leg(skeleton, ankle, toe) else {
             continue;
         };
         let world = skeleton.world_positions(poses);
-        let hold = |joint: usize, label: usize| {
-            let on: Vec<bool> = contacts.iter().map(|labels| labels[label]).collect();
+        let hold = |joint: usize, floor: f64| {
             let path: Vec<DVec3> = world.iter().map(|world| world[joint]).collect();
-            let stands = stands(&on, keyframes);
-            let stands: Vec<Stand> = stands
-                .iter()
-                .flat_map(|stand| steps(stand, &path))
-                .collect();
-            Hold::new(&stands, &path, keyframes)
+            Hold::on_floor(&path, floor, keyframes)
         };
-        let ankle = hold(leg[2], 2 * foot);
-        let toe = hold(leg[3], 2 * foot + 1);
+        let ankle = hold(leg[2], floor.ankle);
+        let toe = hold(leg[3], floor.toe);
         for (frame, pose) in poses.iter_mut().enumerate() {
+            if keyframes.contains(&frame) {
+                continue;
+            }
             // A toe that stands alone takes the ankle along.
-            let moved =
-                ankle.correction[frame] + (1.0 - ankle.weight[frame]) * toe.correction[frame];
+            let alone = toe.weight[frame] * (1.0 - ankle.weight[frame]);
+            let moved = ankle.correction[frame] + alone * toe.correction[frame];
             if moved.length() > STILL {
                 move_ankle(skeleton, pose, &leg, moved);
             }
-            if toe.weight[frame] > 0.0 && (moved - toe.correction[frame]).length() > STILL {
-                let place = world[frame][leg[3]] + toe.correction[frame];
-                aim_foot(skeleton, pose, &leg, place);
-            }
+            let stands = world[frame][leg[3]] + toe.correction[frame];
+            aim_foot(skeleton, pose, &leg, (stands, toe.weight[frame]), floor.toe);
         }
     }
 }
 
 /// Hip, knee, ankle and toe of a leg with this ankle and toe, where the skeleton has one.
-fn leg(skeleton: &Skeleton, [ankle, toe]: &[&str; 2]) -> Option<[usize; 4]> {
-    let (ankle, toe) = (skeleton.index_of(ankle)?, skeleton.index_of(toe)?);
+fn leg(skeleton: &Skeleton, ankle: usize, toe: usize) -> Option<[usize; 4]> {
     let knee = skeleton.joints[ankle].parent?;
     Some([skeleton.joints[knee].parent?, knee, ankle, toe])
+}
+
+/// In which frames a joint is near its floor and slow.
+fn on_floor(path: &[DVec3], floor: f64) -> Vec<bool> {
+    let step = |frame: usize| Some(path.get(frame + 1)?.distance(*path.get(frame)?));
+    let is_slow = |frame: usize| {
+        let beside = [frame.checked_sub(1).and_then(step), step(frame)];
+        beside.into_iter().flatten().any(|step| step < SLOW)
+    };
+    let frames = path.iter().enumerate();
+    frames
+        .map(|(frame, place)| place.y < floor + ON_FLOOR && is_slow(frame))
+        .collect()
+}
+
+/// How far a joint is lifted so that it is nowhere below its floor, `[F]`, cm: over `ease` frames it
+/// comes and goes; at keyframes it is 0.
+fn lift(path: &[DVec3], floor: f64, keyframes: &[usize], ease: usize) -> Vec<f64> {
+    let lacking = path.iter().map(|place| (floor - place.y).max(0.0));
+    let lacking: Vec<f64> = lacking.collect();
+    let around = |frame: usize, of: &[f64]| -> Vec<(f64, f64)> {
+        let (from, to) = (frame.saturating_sub(ease), (frame + ease).min(of.len() - 1));
+        let share = |other: usize| 1.0 - other.abs_diff(frame) as f64 / (ease + 1) as f64;
+        (from..=to)
+            .map(|other| (smooth(share(other)), of[other]))
+            .collect()
+    };
+    let highest = |frame: usize| {
+        let values = around(frame, &lacking).into_iter();
+        values.fold(0.0, |highest: f64, (_, value)| highest.max(value))
+    };
+    let highest: Vec<f64> = (0..path.len()).map(highest).collect();
+    let smoothed = |frame: usize| {
+        let values = around(frame, &highest).into_iter();
+        let (sum, weights) = values.fold((0.0, 0.0), |(sum, weights), (weight, value)| {
+            (sum + weight * value, weights + weight)
+        });
+        // A mean of what is at least as high; rounding aside.
+        let free = fade(frame, keyframes.iter().copied(), ease);
+        (free * sum / weights).max(lacking[frame])
+    };
+    (0..path.len()).map(smoothed).collect()
+}
+
+/// 0 at a keyframe, 1 from `ease` frames on.
+fn fade(frame: usize, keyframes: impl Iterator<Item = usize>, ease: usize) -> f64 {
+    let apart = keyframes.map(|keyframe| keyframe.abs_diff(frame)).min();
+    apart.map_or(1.0, |apart| smooth(apart as f64 / ease as f64))
 }
 
 /// Runs of frames in contact, short gaps closed and short runs dropped, split between the keyframes
@@ -177,6 +226,28 @@ fn steps(stand: &Stand, path: &[DVec3]) -> Vec<Stand> {
 }
 
 impl Hold {
+    /// Of a joint that goes along `path`.
+    fn on_floor(path: &[DVec3], floor: f64, keyframes: &[usize]) -> Self {
+        let lifted = |path: &[DVec3], ease: usize| -> Vec<DVec3> {
+            let lifts = lift(path, floor, keyframes, ease).into_iter();
+            path.iter()
+                .zip(lifts)
+                .map(|(place, lift)| *place + lift * DVec3::Y)
+                .collect()
+        };
+        let above = lifted(path, EASE);
+        let stands = stands(&on_floor(&above, floor), keyframes).into_iter();
+        let stands: Vec<Stand> = stands.flat_map(|stand| steps(&stand, &above)).collect();
+        let held = Self::new(&stands, &above, keyframes);
+        let moved = above.iter().zip(&held.correction);
+        let moved: Vec<DVec3> = moved.map(|(place, moved)| *place + *moved).collect();
+        let wanted = lifted(&moved, LAST_EASE).into_iter();
+        Self {
+            correction: wanted.zip(path).map(|(to, from)| to - *from).collect(),
+            ..held
+        }
+    }
+
     fn new(stands: &[Stand], path: &[DVec3], keyframes: &[usize]) -> Self {
         let mut hold = Self {
             correction: vec![DVec3::ZERO; path.len()],
@@ -191,13 +262,7 @@ impl Hold {
     }
 
     /// Adds one stand; `room` reaches from the end of the one before to the begin of the next.
-    fn add(
-        &mut self,
-        stand: &Stand,
-        room: std::ops::Range<usize>,
-        path: &[DVec3],
-        keyframes: &[usize],
-    ) {
+    fn add(&mut self, stand: &Stand, room: Range<usize>, path: &[DVec3], keyframes: &[usize]) {
         let Stand { from, to, keyframe } = *stand;
         let place = match keyframe {
             Some(keyframe) => path[keyframe],
@@ -211,10 +276,9 @@ impl Hold {
                 gone if frame < from => smooth(1.0 - gone as f64 / (enters + 1) as f64),
                 gone => smooth(1.0 - gone as f64 / (leaves + 1) as f64),
             };
-            let others = keyframes.iter().filter(|other| !(from..to).contains(other));
-            let apart = others.map(|&other| other.abs_diff(frame)).min();
-            let free = apart.map_or(1.0, |apart| smooth(apart as f64 / EASE as f64));
-            let weight = eased * free;
+            let others = keyframes.iter().copied();
+            let others = others.filter(|other| !(from..to).contains(other));
+            let weight = eased * fade(frame, others, EASE);
             self.correction[frame] += weight * (place - path[nearest]);
             self.weight[frame] += weight;
         }
@@ -236,9 +300,12 @@ fn move_ankle(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], moved: 
     if upper.length() < SHORTEST_BONE || lower.length() < SHORTEST_BONE {
         return;
     }
+    let to_place = positions[ankle] + moved - positions[hip];
+    let now = positions[ankle].distance(positions[hip]);
+    let reach = soft_reach(to_place.length(), now, upper.length() + lower.length());
     let limb = two_bone(
         positions[hip],
-        positions[ankle] + moved,
+        positions[hip] + reach * to_place.normalize_or_zero(),
         upper.length(),
         lower.length(),
         positions[knee] - 0.5 * (positions[hip] + positions[ankle]),
@@ -255,16 +322,52 @@ fn move_ankle(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], moved: 
     pose.rotations[ankle] = (shin.inverse() * rotations[ankle]).normalize();
 }
 
-/// Turns the foot so that its toe points at a place.
-fn aim_foot(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], place: DVec3) {
+/// How far from the hip an ankle comes that wants to be so far and is `now`: as far as it is at
+/// least, and never quite as far as the leg is long.
+fn soft_reach(wanted: f64, now: f64, length: f64) -> f64 {
+    let (soft, room) = (SOFT * length, (1.0 - SOFT) * length);
+    let eased = match wanted > soft {
+        true => soft + room * (1.0 - (-(wanted - soft) / room).exp()),
+        false => wanted,
+    };
+    eased.max(wanted.min(now))
+}
+
+/// Turns the foot so that its toe points at a place as much as it stands there, 0 to 1, and is not
+/// below the floor.
+fn aim_foot(
+    skeleton: &Skeleton,
+    pose: &mut Pose,
+    joints: &[usize; 4],
+    (place, stands): (DVec3, f64),
+    floor: f64,
+) {
     let [_, knee, ankle, toe] = *joints;
     let (positions, rotations) = pose.world(skeleton);
-    let (now, wanted) = (positions[toe] - positions[ankle], place - positions[ankle]);
-    if now.length() < SHORTEST_BONE || wanted.length() < SHORTEST_BONE {
+    let now = positions[toe] - positions[ankle];
+    let wanted = positions[toe].lerp(place, stands) - positions[ankle];
+    let length = now.length();
+    if length < SHORTEST_BONE || wanted.length() < SHORTEST_BONE {
         return;
     }
-    let turn = DQuat::from_rotation_arc(now.normalize(), wanted.normalize());
-    pose.rotations[ankle] = (rotations[knee].inverse() * turn * rotations[ankle]).normalize();
+    let wanted = not_below(length * wanted.normalize(), floor - positions[ankle].y);
+    if wanted.distance(now) > STILL {
+        let turn = DQuat::from_rotation_arc(now.normalize(), wanted.normalize());
+        pose.rotations[ankle] = (rotations[knee].inverse() * turn * rotations[ankle]).normalize();
+    }
+}
+
+/// A bone of the same length whose end is not below a height, both from its begin; straight up where
+/// it is too short for that.
+fn not_below(bone: DVec3, height: f64) -> DVec3 {
+    let length = bone.length();
+    if bone.y >= height {
+        return bone;
+    }
+    let y = height.min(length);
+    let along = (length * length - y * y).max(0.0).sqrt();
+    let level = DVec3::new(bone.x, 0.0, bone.z).normalize_or(DVec3::Z);
+    along * level + y * DVec3::Y
 }
 
 #[cfg(test)]

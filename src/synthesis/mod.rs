@@ -31,7 +31,8 @@ pub use error::SynthesisError;
 pub use motion::{SynthesisedMotion, transition_motion};
 pub use request::{KeyframeSource, SequenceRequest, TimedKeyframe, keyframe_of};
 pub use sequence::{
-    FitError, FootSkate, KeyframeMiss, Sequence, SynthesisOptions, synthesise, trajectory_error,
+    FeetOnFloor, FitError, KeyframeMiss, Sequence, SynthesisOptions, ToesOnFloor, synthesise,
+    trajectory_error,
 };
 pub use summary::Summary;
 pub use warning::{ControlWarning, Excess, control_warnings, moved_warnings};

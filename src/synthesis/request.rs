@@ -1,5 +1,7 @@
 //! What a sequence is made from: keyframes in time, the root trajectory, the velocity factors.
 
+use std::ops::Range;
+
 use ndarray::{Array2, s};
 
 use super::SynthesisError;
@@ -10,7 +12,7 @@ use crate::models::transition::DanceClip;
 use crate::models::transition::KeyframePose;
 use crate::models::transition::window::wrap;
 use crate::motion::features::{BODY_VELOCITIES, FACING, ROOT_POSITION, VELOCITY_FACTORS};
-use crate::motion::{PARTS, Skeleton};
+use crate::motion::{Feet, Floor, PARTS, Skeleton};
 
 /// A keyframe and where it stands in the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +50,8 @@ pub struct SequenceRequest {
     pub root_trajectory: Array2<f64>,
     /// Velocity factors wanted, `[F, 5]`, cm/frame.
     pub velocity_factors: Array2<f64>,
+    /// The floor under the clips that the keyframes come from; none on a skeleton without feet.
+    pub floor: Option<Floor>,
 }
 
 impl SequenceRequest {
@@ -93,12 +97,18 @@ impl SequenceRequest {
             keyframes.push(TimedKeyframe { time, keyframe });
         }
         let frames = times[times.len() - 1] + 1;
+        let floors = sources.iter().enumerate().filter_map(|(index, source)| {
+            let is_seen = |seen: &KeyframeSource| std::ptr::eq(seen.clip, source.clip);
+            let is_first = !sources[..index].iter().any(is_seen);
+            is_first.then(|| floor_under(source.clip, 0..source.clip.frames()))?
+        });
         let mut request = Self {
             skeleton,
             frame_time: dancer.frame_time,
             keyframes,
             root_trajectory: Array2::zeros((frames, 3)),
             velocity_factors: Array2::zeros((frames, PARTS)),
+            floor: floors.reduce(Floor::or_lower),
         };
         request.root_trajectory = rows_of(&timed_curve(&times, &request.keyframe_roots()));
         request.velocity_factors = request.velocity_between_keyframes();
@@ -128,8 +138,8 @@ impl SequenceRequest {
         Self::from_keyframes(&sources)?.like(clip, first)
     }
 
-    /// The same with root trajectory and velocity factors of a clip, from its frame `first` on.
-    /// Keyframes are not moved.
+    /// The same with root trajectory, velocity factors and floor of a clip, from its frame `first`
+    /// on. Keyframes are not moved.
     ///
     /// # Errors
     /// The clip ends before the last keyframe.
@@ -141,6 +151,7 @@ impl SequenceRequest {
         let rows = clip.features.slice(s![first..end, ..]);
         self.root_trajectory = rows.slice(s![.., ROOT_POSITION]).to_owned();
         self.velocity_factors = rows.slice(s![.., VELOCITY_FACTORS]).to_owned();
+        self.floor = floor_under(clip, first..end);
         Ok(self)
     }
 
@@ -261,6 +272,14 @@ pub fn keyframe_of(clip: &DanceClip, frame: usize) -> Result<KeyframePose, Synth
         features,
         pose: pose.clone(),
     })
+}
+
+/// The floor under some frames of a clip.
+fn floor_under(clip: &DanceClip, frames: Range<usize>) -> Option<Floor> {
+    let DanceClip { clip, .. } = clip;
+    let feet = Feet::of(&clip.skeleton).ok()?;
+    let world = clip.skeleton.world_positions(clip.poses.get(frames)?);
+    Some(Floor::under(&world, &feet))
 }
 
 fn no_frame(clip: &DanceClip, frame: usize) -> SynthesisError {

@@ -12,19 +12,19 @@ use super::{SequenceRequest, SynthesisError};
 use crate::models::generator::NeededPoses;
 use crate::models::transition::KeyframePose;
 use crate::models::{Generator, Motion};
-use crate::motion::contact::{CONTACT_LABEL, FOOT_JOINTS, foot_skate};
+use crate::motion::contact::{CONTACT_LABEL, FOOT_JOINTS, FootTravel};
 use crate::motion::facing::{FacingJoints, facing_angles};
 use crate::motion::features::{
     CONTACTS, FACING, FRAME, VELOCITY_FACTORS, write_positions, write_velocities,
 };
 use crate::motion::fit::fit_rotations;
 use crate::motion::placement::vector;
-use crate::motion::{Clip, FeatureConfig, Pose};
+use crate::motion::{Clip, FeatureConfig, Feet, Floor, Pose};
 
 /// What is done to the predicted motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SynthesisOptions {
-    /// Pin feet where contact is predicted.
+    /// Pin feet where they stand on the floor, and lift them where they are below it.
     pub foot_cleanup: bool,
 }
 
@@ -62,17 +62,27 @@ pub struct Sequence {
     /// One for each keyframe but the first.
     pub misses: Vec<KeyframeMiss>,
     pub fit: FitError,
-    pub foot_skate: FootSkate,
+    /// None on a skeleton without feet.
+    pub feet: Option<FeetOnFloor>,
 }
 
-/// Mean distance that a foot joint moves a frame in the world while contact is predicted, cm/frame;
-/// none where no contact is.
+/// How well feet keep to the floor: that of the request or, where a keyframe's feet are lower, the
+/// keyframe's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FootSkate {
+pub struct FeetOnFloor {
     /// Before the feet are pinned.
-    pub before: Option<f64>,
+    pub before: ToesOnFloor,
     /// Of the clip; the same where no foot was pinned.
-    pub after: Option<f64>,
+    pub after: ToesOnFloor,
+}
+
+/// How well toes keep to the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToesOnFloor {
+    /// Foot skate, see [`Floor::toe_travel`].
+    pub travel: FootTravel,
+    /// See [`Floor::lowest_toe`], cm.
+    pub lowest: f64,
 }
 
 /// How far the root of a sequence is from the trajectory that was asked for, mean and maximum over
@@ -297,6 +307,16 @@ impl<'r> Made<'r> {
         rows
     }
 
+    /// The feet, and the floor under request and keyframes.
+    fn floor(&self) -> Option<(Feet, Floor)> {
+        let request = self.request;
+        let feet = Feet::of(&request.skeleton).ok()?;
+        let keyframes = request.keyframes.iter();
+        let world = keyframes.map(|it| it.keyframe.pose.world_positions(&request.skeleton));
+        let under = Floor::under(&world.collect::<Vec<_>>(), &feet);
+        Some((feet, request.floor?.or_lower(under)))
+    }
+
     fn finish(mut self, options: &SynthesisOptions, name: &str) -> Sequence {
         let labels = self.contacts.rows().into_iter();
         let contacts: Vec<[bool; 4]> = labels
@@ -304,14 +324,22 @@ impl<'r> Made<'r> {
             .collect();
         let fits = &self.fits;
         let skeleton = &self.request.skeleton;
-        let skate =
-            |poses: &[Pose]| foot_skate(&skeleton.world_positions(poses), FOOT_JOINTS, &contacts);
         let keyframes = self.request.times();
-        let before = skate(&self.poses);
-        if options.foot_cleanup {
-            pin_feet(skeleton, &mut self.poses, &contacts, &keyframes);
-        }
-        let after = skate(&self.poses);
+        let feet = self.floor().map(|(feet, floor)| {
+            let toes = |poses: &[Pose]| {
+                let world = skeleton.world_positions(poses);
+                ToesOnFloor {
+                    travel: floor.toe_travel(&world, &feet),
+                    lowest: floor.lowest_toe(&world, &feet),
+                }
+            };
+            let before = toes(&self.poses);
+            if options.foot_cleanup {
+                pin_feet(skeleton, &mut self.poses, &feet, &floor, &keyframes);
+            }
+            let after = toes(&self.poses);
+            FeetOnFloor { before, after }
+        });
         let frames: usize = fits.iter().map(|(frames, ..)| frames).sum();
         let sum: f64 = fits
             .iter()
@@ -326,7 +354,7 @@ impl<'r> Made<'r> {
                 mean: sum / frames.max(1) as f64,
                 max: fits.iter().fold(0.0, |max, &(.., worst)| max.max(worst)),
             },
-            foot_skate: FootSkate { before, after },
+            feet,
             clip: Clip {
                 name: name.into(),
                 skeleton: skeleton.clone(),

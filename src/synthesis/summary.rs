@@ -5,7 +5,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{ControlWarning, Sequence, SequenceRequest, SynthesisOptions, trajectory_error};
+use super::{
+    ControlWarning, Sequence, SequenceRequest, SynthesisOptions, ToesOnFloor, trajectory_error,
+};
 use crate::counted::counted;
 
 /// The units of the numbers beside it, by their names.
@@ -22,10 +24,10 @@ pub struct Summary {
     trajectory_error: Distances,
     /// From predicted positions to those of the fitted rotations.
     rotation_fit_error: Distances,
-    /// cm/frame of a foot joint in predicted contact; none where no contact is predicted.
-    foot_skate: Option<f64>,
+    /// None without feet.
+    feet: Option<FeetSummary>,
     /// The same after the feet were pinned; none where they were not.
-    foot_skate_cleaned: Option<f64>,
+    feet_pinned: Option<FeetSummary>,
     warnings: Vec<String>,
     units: Units,
 }
@@ -36,6 +38,38 @@ struct KeyframeSummary {
     /// From the joints of the model's own last frame to the keyframe's, before it was bent onto it;
     /// none for the first keyframe.
     missed: Option<Distances>,
+}
+
+/// Toes within 3 cm of the floor, which is as low as the feet come where the keyframes are from.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct FeetSummary {
+    /// cm/frame; none where no toe is on the floor.
+    foot_skate: Option<f64>,
+    /// Of the lowest toe above the floor; below 0 it goes through it.
+    lowest_toe: f64,
+}
+
+impl From<ToesOnFloor> for FeetSummary {
+    fn from(ToesOnFloor { travel, lowest }: ToesOnFloor) -> Self {
+        Self {
+            foot_skate: travel.mean(),
+            lowest_toe: lowest,
+        }
+    }
+}
+
+impl fmt::Display for FeetSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.foot_skate {
+            Some(skate) => write!(f, "toes on the floor slide {skate:.2} cm/frame")?,
+            None => write!(f, "no toe is on the floor")?,
+        }
+        match self.lowest_toe {
+            // What would be printed as 0.0.
+            lowest if lowest < -0.05 => write!(f, ", the lowest goes {:.1} cm into it", -lowest),
+            _ => Ok(()),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -63,6 +97,7 @@ impl Summary {
             missed: missed(frame),
         });
         let (mean, max) = trajectory_error(request, sequence);
+        let pinned = sequence.feet.filter(|_| options.foot_cleanup);
         Self {
             model: model.into(),
             frames: sequence.clip.poses.len(),
@@ -73,8 +108,8 @@ impl Summary {
                 mean: sequence.fit.mean,
                 max: sequence.fit.max,
             },
-            foot_skate: sequence.foot_skate.before,
-            foot_skate_cleaned: sequence.foot_skate.after.filter(|_| options.foot_cleanup),
+            feet: sequence.feet.map(|feet| feet.before.into()),
+            feet_pinned: pinned.map(|feet| feet.after.into()),
             warnings: warnings.iter().map(ToString::to_string).collect(),
             units: Units::from([
                 ("fps", "frames/s"),
@@ -82,7 +117,7 @@ impl Summary {
                 ("trajectory_error", "cm"),
                 ("rotation_fit_error", "cm"),
                 ("foot_skate", "cm/frame"),
-                ("foot_skate_cleaned", "cm/frame"),
+                ("lowest_toe", "cm"),
             ]),
         }
     }
@@ -129,13 +164,13 @@ impl fmt::Display for Summary {
             f,
             "rotations meet the predicted positions to {mean:.1} cm in the mean, {max:.1} cm at most"
         )?;
-        match (self.foot_skate, self.foot_skate_cleaned) {
-            (None, _) => writeln!(f, "the model predicts no foot on the ground"),
-            (Some(skate), None) => writeln!(f, "feet on the ground slide {skate:.2} cm/frame"),
-            (Some(skate), Some(cleaned)) => writeln!(
-                f,
-                "feet on the ground slid {skate:.2} cm/frame, {cleaned:.2} after they were pinned"
-            ),
+        match (self.feet, self.feet_pinned) {
+            (None, _) => Ok(()),
+            (Some(feet), None) => writeln!(f, "{feet}"),
+            (Some(feet), Some(pinned)) => {
+                writeln!(f, "{feet}")?;
+                writeln!(f, "after the feet were pinned {pinned}")
+            }
         }
     }
 }

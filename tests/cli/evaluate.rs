@@ -82,6 +82,25 @@ fn the_json_has_every_score_at_every_length_and_their_averages() {
 }
 
 #[test]
+fn exports_are_scored_by_name_only_and_their_pinned_toes_stay_on_the_floor() {
+    let out = TempDir::new().unwrap();
+    let file = out.path().join("scores.json");
+    evaluate(&FIXTURE.path("interpolation.toml"))
+        .args(["--protocol", "exports", "--lengths", "40", "--windows", "4"])
+        .arg("--json")
+        .arg(&file)
+        .assert()
+        .success()
+        .stdout(contains("foot skate, pinned").and(contains("into the floor")));
+    let scores = &json(&file)["exports"];
+    let score = |metric: &str| scores[metric]["40"].as_f64().unwrap();
+    assert_eq!(scores["windows"]["40"], 4);
+    assert!(score("foot_skate_pinned") < score("foot_skate"));
+    assert!(score("into_floor") > 0.1 && score("into_floor_pinned") < 1e-6);
+    assert!(score("jerk_pinned") > 0.0 && score("jerk_recorded") > 0.0);
+}
+
+#[test]
 fn a_run_gets_its_scores_and_any_number_of_threads_gives_the_same() {
     let run = copied_run();
     let out = TempDir::new().unwrap();

@@ -12,6 +12,7 @@ use keydance::models::baselines::interpolation::Interpolation;
 use keydance::models::transition::DanceClip;
 use keydance::models::transition::{DataRanges, window_features};
 use keydance::models::transition::{Transition, TransitionModel, TransitionRequest};
+use keydance::motion::contact::{FOOT_JOINTS, foot_skate};
 use keydance::motion::features::{
     BODY_POSITIONS, BODY_VELOCITIES, CONTACTS, FACING, FRAME, ROOT_POSITION, VELOCITY_FACTORS,
 };
@@ -326,7 +327,7 @@ impl TransitionModel for Sliding {
 }
 
 #[test]
-fn feet_in_contact_are_pinned_and_keyframes_stay() {
+fn feet_on_the_floor_are_pinned_and_keyframes_stay() {
     let clip = dance(4, 200);
     let request = SequenceRequest::from_clip(&clip, &[20, 170]).unwrap();
     let model = Sliding {
@@ -335,12 +336,16 @@ fn feet_in_contact_are_pinned_and_keyframes_stay() {
     let options = SynthesisOptions { foot_cleanup: true };
     let plain = synthesise(&model, &request, &PLAIN, "dance").unwrap();
     let pinned = synthesise(&model, &request, &options, "dance").unwrap();
-    assert_eq!(plain.foot_skate.before, plain.foot_skate.after);
-    assert_eq!(plain.foot_skate.before, pinned.foot_skate.before);
-    let (before, after) = (
-        pinned.foot_skate.before.unwrap(),
-        pinned.foot_skate.after.unwrap(),
-    );
+    let skates = |sequence: &Sequence| {
+        let feet = sequence.feet.unwrap();
+        [feet.before, feet.after].map(|toes| toes.travel.mean().unwrap())
+    };
+    let [before, after] = skates(&pinned);
+    assert_eq!(skates(&plain), [before; 2]);
+    assert!(before > 0.5 && after < before, "{before} {after}");
+    // A toe on the floor may be taking off; one in contact stands.
+    let [before, after] = [&plain, &pinned]
+        .map(|sequence| foot_skate(&world(sequence), FOOT_JOINTS, &sequence.contacts).unwrap());
     assert!(before > 0.5 && after < 0.3 * before, "{before} {after}");
     assert_at_keyframes(&pinned, &request);
     // The correction comes and goes smoothly: nothing jumps that did not before.
@@ -351,6 +356,20 @@ fn feet_in_contact_are_pinned_and_keyframes_stay() {
         assert!(worst < bound, "frame {frame}: {worst} {bound}");
     }
     assert_eq!(pinned[75][23], plain[75][23]);
+}
+
+#[test]
+fn feet_that_are_pinned_do_not_go_through_the_floor() {
+    for seed in 1..6 {
+        let clip = dance(seed, 200);
+        let request = SequenceRequest::from_clip(&clip, &[20, 90, 130, 190]).unwrap();
+        let options = SynthesisOptions { foot_cleanup: true };
+        let plain = synthesise(&Astray::default(), &request, &PLAIN, "dance").unwrap();
+        let pinned = synthesise(&Astray::default(), &request, &options, "dance").unwrap();
+        let [before, after] = [&plain, &pinned].map(|it| it.feet.unwrap().after.lowest);
+        assert!(before < -1.0 && after > -1e-6, "{before} {after}");
+        assert_at_keyframes(&pinned, &request);
+    }
 }
 
 #[test]

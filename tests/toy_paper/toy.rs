@@ -68,6 +68,7 @@ impl ModelKind for ToyKind {
                 [rows.toy]\ntitle = 'Toy'\nnll = [2.5]",
             figures: None,
             demo: None,
+            by_name: |_, _| Vec::new(),
             protocols: |_, _| vec![Box::new(ToyProtocol)],
         }]
     }

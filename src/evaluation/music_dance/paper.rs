@@ -10,6 +10,7 @@ pub const PU2022: Paper = Paper {
     printed: include_str!("../../../experiments/pu2022/paper.toml"),
     figures: Some(draw),
     demo: Some(crate::report::demo::pu2022::open),
+    by_name: |_, _| Vec::new(),
     protocols: |data, options| {
         vec![Box::new(
             MusicDance::new(options).with_beats(data.motion_beats),

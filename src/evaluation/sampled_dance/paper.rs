@@ -9,6 +9,7 @@ pub const VALLEPEREZ2021: Paper = Paper {
     printed: include_str!("../../../experiments/valleperez2021/paper.toml"),
     figures: Some(crate::report::figures::valleperez2021::draw),
     demo: Some(crate::report::demo::valleperez2021::open),
+    by_name: |_, _| Vec::new(),
     protocols: |_, options| {
         vec![
             Box::new(Likelihood::new(options)),

@@ -194,7 +194,7 @@ impl TransitionScoring {
     }
 
     /// Windows of so many frames, and the clips that are shorter.
-    fn cut(&self, clip_frames: &[usize], frames: usize) -> (Vec<Window>, Vec<usize>) {
+    pub(super) fn cut(&self, clip_frames: &[usize], frames: usize) -> (Vec<Window>, Vec<usize>) {
         let cut = windows(clip_frames, frames - 1);
         (spread(cut.windows, self.most_windows), cut.skipped)
     }

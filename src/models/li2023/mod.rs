@@ -60,6 +60,7 @@ pub const DANCE: Paper = Paper {
     printed: include_str!("../../../experiments/li2023/paper.toml"),
     figures: Some(figures::draw),
     demo: None,
+    by_name: |_, _| Vec::new(),
     protocols: |data, options| vec![Box::new(InBetweening::dance(data, options))],
 };
 
@@ -69,5 +70,6 @@ pub const LAFAN1: Paper = Paper {
     printed: include_str!("../../../experiments/li2023_lafan1/paper.toml"),
     figures: Some(figures::draw),
     demo: None,
+    by_name: |_, _| Vec::new(),
     protocols: |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
 };

@@ -27,6 +27,7 @@ pub use prior::Prior;
 
 use crate::data::DataConfig;
 use crate::evaluation::equations::Equations;
+use crate::evaluation::exports::Exports;
 use crate::evaluation::published::Published;
 use crate::evaluation::transitions::TransitionScoring;
 use crate::evaluation::{EvaluationOptions, Protocol};
@@ -39,6 +40,10 @@ pub const PAPER: Paper = Paper {
     figures: Some(crate::report::figures::pan2021::draw),
     demo: Some(crate::report::demo::pan2021::open),
     protocols,
+    by_name: |data, options| {
+        let scoring = TransitionScoring::new(data.features(), options);
+        vec![Box::new(Exports(scoring))]
+    },
 };
 
 fn protocols(data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
