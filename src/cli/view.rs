@@ -17,7 +17,8 @@ use crate::run::{check_outputs, replace_file};
 /// The page opens from disk and needs no network. "Pick" (m) takes the frame shown as a keyframe
 /// and hands over all that were picked as generate takes them; a link leads to a frame; "Film"
 /// saves the scene as WebM. Several clips stand side by side or over each other, at the first one's
-/// rate.
+/// rate. BVH files that are dropped on any such page, or opened from it, are shown in place of its
+/// own, each skeleton as it is.
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// BVH files

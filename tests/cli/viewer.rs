@@ -1,12 +1,13 @@
 //! The motion viewer: a page that holds what it was given, escapes what users wrote, and plays in a
 //! browser.
 
+use std::f64::consts::FRAC_PI_2;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use keydance::data::DataConfig;
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::evaluation::transitions::window_request;
@@ -205,6 +206,71 @@ fn a_frame_is_picked_by_a_key() {
     let loaded = browser::load(&browser, &file, "#frame=12", is_shown);
     assert_eq!(loaded.attribute("data-error"), None, "{}", loaded.log);
     assert!(is_shown(&loaded), "{:?}", picked(&loaded));
+}
+
+#[test]
+fn files_that_are_dropped_on_a_page_are_shown_in_place_of_its_own() {
+    let Some(browser) = browser::browser() else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let file = clips_page(folder.path());
+    let dropped = |name: &str, text: &str, ready: fn(&Loaded) -> bool| {
+        let script = format!(
+            "<script type=\"module\">
+            if (document.title !== {name:?}) {{
+              const dataTransfer = new DataTransfer();
+              dataTransfer.items.add(new File([{text:?}], {name:?}));
+              dispatchEvent(new DragEvent(\"drop\", {{ dataTransfer }}));
+            }}
+            </script></body>"
+        );
+        let page = fs::read_to_string(&file).unwrap();
+        let page_file = folder.path().join("dropped.html");
+        fs::write(&page_file, page.replace("</body>", &script)).unwrap();
+        browser::load(&browser, &page_file, "", ready)
+    };
+    let clip = bvh::read(&folder.path().join("short.bvh")).unwrap();
+    let mut metres = clip.to_clip();
+    let to_z_up = DQuat::from_rotation_x(FRAC_PI_2);
+    for joint in &mut metres.skeleton.joints {
+        joint.offset *= 0.01;
+    }
+    for pose in &mut metres.poses {
+        pose.translations
+            .iter_mut()
+            .for_each(|place| *place *= 0.01);
+        pose.translations[0] = to_z_up * pose.translations[0];
+        pose.rotations[0] = to_z_up * pose.rotations[0];
+    }
+    let channels = bvh::channel_layout(&metres, [BvhAxis::Z, BvhAxis::X, BvhAxis::Y]);
+    let text = Bvh::from_clip(&metres, channels).unwrap().to_text();
+    let shown = dropped("metres.bvh", &text, |page| {
+        page.document.contains("<h1>metres.bvh</h1>") && page.has_drawn()
+    });
+    assert_eq!(shown.attribute("data-error"), None, "{}", shown.log);
+    let data = page_data(&shown.document);
+    assert_eq!(data["frames"], json!(25));
+    let summary = data["summary"].as_str().unwrap();
+    assert!(summary.ends_with("in m, Z up"), "{summary}");
+    let joints = metres.skeleton.len();
+    let named = data["parents"].as_array().unwrap();
+    assert!(named.len() >= joints, "the ends of limbs are shown, too");
+    let root = decoded(&data["motions"][0]["positions"]);
+    let expected = clip.to_clip().poses[0].translations[0];
+    for (axis, wanted) in expected.to_array().into_iter().enumerate() {
+        assert!(
+            (root[axis] - wanted).abs() < 0.1,
+            "{:?} {expected}",
+            &root[..3]
+        );
+    }
+
+    let refused = dropped("notes.bvh", "HIERARCHY and nothing else", |page| {
+        page.document.contains("notes.bvh is no BVH file")
+    });
+    assert!(refused.document.contains("and is not understood"));
+    assert_eq!(page_data(&refused.document)["frames"], json!(40));
 }
 
 #[test]

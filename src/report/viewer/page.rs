@@ -16,9 +16,10 @@ pub(in crate::report) const SCENE_SCRIPTS: [&str; 4] = [
     include_str!("music.js"),
 ];
 /// What is round it.
-const SCRIPTS: [&str; 3] = [
+const SCRIPTS: [&str; 4] = [
     include_str!("curves.js"),
     include_str!("hand_on.js"),
+    include_str!("dropped.js"),
     include_str!("player.js"),
 ];
 

@@ -289,6 +289,7 @@ function begin() {
   addEventListener("keydown", onKey);
   listenToPointers();
   listenToHandOn();
+  listenToFiles();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => setTheme(event.matches ? "dark" : "light"));
   const resized = new ResizeObserver(() => {
     forgetStrips();

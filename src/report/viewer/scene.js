@@ -219,7 +219,7 @@ function drawScene(frame, look) {
   let view;
   groups.forEach((group, index) => {
     const cell = places[index];
-    view = projection(cell, shown[0], frame);
+    view = projection(cell, group[0], frame);
     scene.save();
     scene.beginPath();
     scene.rect(cell.x, cell.y, cell.width, cell.height);
