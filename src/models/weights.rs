@@ -210,6 +210,11 @@ impl SavedWeights {
         Ok(array.mapv(f64::from))
     }
 
+    /// Whether there is an array of this name: what files of earlier versions lack is optional.
+    pub fn has(&self, name: &str) -> bool {
+        self.arrays.contains_key(name)
+    }
+
     /// One of the model's [`Statistics`] that is a list of any length.
     ///
     /// # Errors

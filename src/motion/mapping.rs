@@ -53,6 +53,12 @@ pub enum MappingError {
         difference: (usize, String, String),
         missing: Vec<&'static str>,
     },
+    #[error("{file}: {left} and {right} are mapped to one place; each side has its own")]
+    BothSides {
+        file: String,
+        left: &'static str,
+        right: &'static str,
+    },
     #[error("{file}: {key} = {value}: expected {expected}")]
     Value {
         file: String,
@@ -229,6 +235,16 @@ impl Mapping {
                 file: file.into(),
                 joints: lacking.join(", "),
             });
+        }
+        let places = || DANCE_JOINTS.into_iter().zip(&found);
+        for (left, place) in places() {
+            let name = left.strip_prefix("Left");
+            let is_other_side = |joint: &str| joint.strip_prefix("Right") == name;
+            let same = places().find(|(it, other)| is_other_side(it) && *other == place);
+            if let Some((right, _)) = same.filter(|_| name.is_some()) {
+                let file = file.into();
+                return Err(MappingError::BothSides { file, left, right });
+            }
         }
         Ok(Self {
             file: file.into(),

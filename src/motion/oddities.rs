@@ -3,6 +3,8 @@
 use glam::DVec3;
 
 use super::clip::Clip;
+use super::contact_foot::Feet;
+use super::facing::FacingJoints;
 use crate::counted::counted;
 
 /// A step at the beginning is a jump where its fastest joint goes this many times as far as any
@@ -22,6 +24,23 @@ pub fn oddities(clip: &Clip) -> Vec<String> {
         .into_iter()
         .chain(jump_at_the_beginning(clip))
         .collect()
+}
+
+/// Toes that point backwards by where hips and arms are: left and right of a mapping are swapped.
+pub fn backward_toes(clip: &Clip) -> Option<String> {
+    let feet = Feet::of(&clip.skeleton).ok()?;
+    let body = FacingJoints::of(&clip.skeleton).ok()?;
+    let ahead = clip.poses.iter().map(|pose| {
+        let world = pose.world_positions(&clip.skeleton);
+        let angle = body.angle(&world);
+        let forward = DVec3::new(angle.sin(), 0.0, angle.cos());
+        let pairs = feet.ankles.into_iter().zip(feet.toes);
+        let of_foot = pairs.map(|(ankle, toe)| (world[toe] - world[ankle]).dot(forward));
+        of_foot.sum::<f64>()
+    });
+    (ahead.sum::<f64>() < 0.0).then(|| {
+        "the toes point backwards: left and right may be swapped in its mapping".to_string()
+    })
 }
 
 /// Joints that stand on their parents in every frame though their offsets do not: position channels

@@ -8,6 +8,7 @@ use super::completion::CompletionRequest;
 use super::keyframes::{
     FileKeyframe, KeyframeChoice, KeyframeError, TimedKeyframes, kept_channels, lengthened,
 };
+use super::retarget::check_rest;
 use crate::data::{DataConfig, FileReading};
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::{Clip, ContactRule, Feet, Foot, Mapping, Pose};
@@ -91,6 +92,7 @@ impl ClipKeyframes {
                     joints: [first.skeleton.len(), clip.skeleton.len()],
                 });
             }
+            check_rest(&clip.skeleton, &first.skeleton, &clip.name)?;
             if let Some((_, dancer)) = keyframes.first() {
                 pose.translations[1..].clone_from_slice(&dancer.translations[1..]);
             }

@@ -256,12 +256,32 @@ impl Keyframes {
                 read.sources.insert(keyframe.file.clone(), source);
             }
         }
+        if !choice.own_frames {
+            read.notices.extend(read.counted_otherwise());
+        }
         Ok(read)
     }
 
     /// What is odd about the files, or was recognised and converted; no error.
     pub fn notices(&self) -> &[String] {
         &self.notices
+    }
+
+    /// That a file's rows of poses, which are to be put elsewhere in time, are counted at another
+    /// rate than its own.
+    fn counted_otherwise(&self) -> Option<String> {
+        let (path, _) = self.motion.as_ref().filter(|_| !self.lengths.is_empty())?;
+        let (source, fps) = (&self.sources[path], self.data.fps);
+        let own = 1.0 / source.frame_time;
+        let last = self.keyframes.last()?.frame;
+        ((own / fps - 1.0).abs() > SAME_RATE).then(|| {
+            format!(
+                "{}: --keyframes count at {fps} frames a second, the file has {own:.4}: frame {last} \
+                 is its frame {:.1}; for poses made by hand give --own-frames",
+                source.clip.name,
+                last as f64 * own / fps
+            )
+        })
     }
 
     /// Reads the dancer's file with its keyframes as whole frames.

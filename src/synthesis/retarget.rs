@@ -6,14 +6,11 @@ use super::SynthesisError;
 use crate::models::transition::KeyframePose;
 use crate::motion::features::{ROOT_POSITION, write_positions};
 use crate::motion::fit::fit_rotations;
+use crate::motion::rest_pose::{other_rest_pose, rest_directions};
 use crate::motion::{Pose, Skeleton};
 
 /// Bones that differ by no more than this are the same, cm.
 const SAME: f64 = 1e-6;
-/// Bones below this share of the legs' length are too short to have a direction.
-const SHORT: f64 = 1.0 / 160.0;
-/// Rest directions of a bone may differ by this between two dancers, rad.
-const REST: f64 = 0.5;
 /// Legs of two dancers are at most so many times as long, whatever their sizes.
 const SIZES: f64 = 3.0;
 /// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis
@@ -78,18 +75,7 @@ pub(super) fn retarget(
         bones.map(|joint| joint.offset.length()).sum()
     };
     let (their_legs, our_legs) = (legs(from), legs(skeleton));
-    for (theirs, ours) in from.joints.iter().zip(&skeleton.joints).skip(1) {
-        let has_direction =
-            theirs.offset.length() > SHORT * their_legs && ours.offset.length() > SHORT * our_legs;
-        let apart = theirs.offset.angle_between(ours.offset);
-        if has_direction && apart > REST {
-            return Err(SynthesisError::RestPose {
-                clip: clip.into(),
-                joint: ours.name.clone(),
-                degrees: apart.to_degrees(),
-            });
-        }
-    }
+    check_rest(from, skeleton, clip)?;
     let ratio = their_legs / our_legs;
     if their_legs.min(our_legs) > SAME && !(1.0 / SIZES..=SIZES).contains(&ratio) {
         return Err(SynthesisError::Size {
@@ -103,6 +89,25 @@ pub(super) fn retarget(
     set_bones(&mut keyframe.pose, skeleton);
     refresh(&mut keyframe, skeleton);
     Ok(keyframe)
+}
+
+/// Refuses a clip whose rest pose is not the skeleton's.
+///
+/// # Errors
+/// [`SynthesisError::RestPose`].
+pub(super) fn check_rest(
+    from: &Skeleton,
+    skeleton: &Skeleton,
+    clip: &str,
+) -> Result<(), SynthesisError> {
+    match other_rest_pose(&rest_directions(skeleton), &rest_directions(from)) {
+        Some((joint, apart)) => Err(SynthesisError::RestPose {
+            clip: clip.into(),
+            joint: skeleton.joints[joint].name.clone(),
+            degrees: apart.to_degrees(),
+        }),
+        None => Ok(()),
+    }
 }
 
 fn has_bones(pose: &Pose, skeleton: &Skeleton) -> bool {

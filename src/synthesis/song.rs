@@ -11,13 +11,14 @@ use thiserror::Error;
 
 use super::clip_keyframes::{Source, no_frame, read};
 use super::keyframes::{FileFrom, FileKeyframe, KeyframeChoice, KeyframeError, LONGEST};
+use super::retarget::check_rest;
 use super::summary::Units;
 use crate::counted::counted;
 use crate::data::DataConfig;
 use crate::models::generator::{Given, Motion, NeededPoses, Request};
 use crate::models::{Generator, ModelError};
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, channel_layout};
-use crate::motion::{Clip, Mapping, MappingError, Pose};
+use crate::motion::{Clip, Mapping, MappingError, Pose, Skeleton};
 use crate::music::{Analysis, Cache, MusicError};
 
 /// Key poses nearer to the seed than this get a warning, frames.
@@ -247,7 +248,8 @@ impl Song {
             notices: Vec::new(),
         };
         let (seed, held) = files.seed(&choice.seed, needed)?;
-        let keys = files.key_poses(&choice.key_poses, &seed[0], needed, frames)?;
+        let dancer = (files.clip(choice.seed.file())?.skeleton.clone(), &seed[0]);
+        let keys = files.key_poses(&choice.key_poses, dancer, needed, frames)?;
         notices.append(&mut files.notices);
         let (last, free) = (needed.saturating_sub(1), needed + NEAR);
         let near = keys.iter().filter(|(frame, _)| *frame < free);
@@ -428,7 +430,7 @@ impl Files {
     fn key_poses(
         &mut self,
         asked: &[FileKeyframe],
-        dancer: &Pose,
+        (skeleton, dancer): (Skeleton, &Pose),
         seed: usize,
         frames: usize,
     ) -> Result<Vec<(usize, Pose)>, SongError> {
@@ -461,6 +463,8 @@ impl Files {
                 let joints = [pose.translations.len(), dancer.translations.len()];
                 return Err(KeyframeError::OtherJoints { files, joints }.into());
             }
+            let clip = self.clip(&key.file)?;
+            check_rest(&clip.skeleton, &skeleton, &clip.name).map_err(KeyframeError::from)?;
             pose.translations[1..].clone_from_slice(&dancer.translations[1..]);
             keys.push((key.time, pose));
         }

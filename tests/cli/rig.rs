@@ -344,6 +344,75 @@ fn a_rig_that_is_not_recognised_is_mapped_by_a_file_that_the_program_began() {
 }
 
 #[test]
+fn a_mapping_with_sides_swapped_or_one_for_both_is_told() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("own.bvh"), own_clip(0).to_text()).unwrap();
+    let whole = RIGS[0].body().sources;
+    let mapped = |source: &dyn Fn(&str) -> String| {
+        let lines = DANCE_JOINTS.map(|joint| format!("{joint} = \"{}\"\n", source(joint)));
+        fs::write(path("map.toml"), format!("[joints]\n{}", lines.concat())).unwrap();
+        let options = [
+            "--motion",
+            "own.bvh",
+            "--keyframes",
+            "0,40",
+            "--mapping",
+            "map.toml",
+        ];
+        generate(folder.path(), &options)
+    };
+    let output = mapped(&|joint| {
+        let one = joint.replace("LeftHand", "RightHand");
+        whole[&one].clone()
+    });
+    assert!(!output.status.success() && !path("dance.bvh").exists());
+    let said = stderr(&output);
+    assert!(
+        said.contains("LeftHand and RightHand are mapped to one place"),
+        "{said}"
+    );
+    let output = mapped(&|joint| {
+        let other = match joint.strip_prefix("Left") {
+            Some(part) => format!("Right{part}"),
+            None => joint.replace("Right", "Left"),
+        };
+        whole[&other].clone()
+    });
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("the toes point backwards"),
+        "{}",
+        stderr(&output)
+    );
+    fs::remove_file(path("dance.bvh")).unwrap();
+    let output = mapped(&|joint| whole[joint].clone());
+    assert!(!stderr(&output).contains("the toes point backwards"));
+}
+
+#[test]
+fn rows_of_poses_that_are_counted_at_another_rate_than_their_files_get_a_hint() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("own.bvh"), own_clip(0).to_text()).unwrap();
+    let rows = [
+        "--motion",
+        "own.bvh",
+        "--keyframes",
+        "0,2",
+        "--length",
+        "40",
+    ];
+    let said = stderr(&generate(folder.path(), &rows));
+    assert!(said.contains("frame 2 is its frame 1.6"), "{said}");
+    fs::remove_file(folder.path().join("dance.bvh")).unwrap();
+    let said = stderr(&generate(
+        folder.path(),
+        &[&rows[..], &["--own-frames"]].concat(),
+    ));
+    assert!(!said.contains("is its frame"), "{said}");
+}
+
+#[test]
 fn completions_and_man_pages_know_every_command() {
     let commands = Cli::command();
     let names: Vec<&str> = commands.get_subcommands().map(|it| it.get_name()).collect();

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use keydance::motion::bvh;
+use glam::DVec3;
+use keydance::motion::bvh::{self, Bvh};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
@@ -179,6 +180,46 @@ fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
         .assert()
         .failure()
         .stderr(contains("give --music SONG"));
+}
+
+#[test]
+fn a_seed_or_key_pose_on_another_rest_pose_is_refused_and_nothing_is_written() {
+    let folder = TempDir::new().unwrap();
+    let (out, other) = (
+        folder.path().join("dance.bvh"),
+        folder.path().join("other.bvh"),
+    );
+    let document = bvh::read(&FIXTURE.file(1, "bvh")).unwrap();
+    let mut clip = document.to_clip();
+    for joint in &mut clip.skeleton.joints {
+        joint.offset = DVec3::new(joint.offset.y, joint.offset.x, joint.offset.z);
+    }
+    for pose in &mut clip.poses {
+        let offsets = clip.skeleton.joints.iter().map(|joint| joint.offset);
+        let joints = pose.translations.iter_mut().zip(offsets).skip(1);
+        joints.for_each(|(place, offset)| *place = offset);
+    }
+    let turned = Bvh::from_clip(&clip, document.channels().to_vec()).unwrap();
+    bvh::write(&other, &turned).unwrap();
+    let file = other.display();
+    for (option, value) in [
+        ("--seed-motion", format!("{file}:0")),
+        ("--seed-pose", format!("{file}:3")),
+        ("--keyframe", format!("{file}:75@60")),
+    ] {
+        let mut command = match option {
+            "--keyframe" => FIXTURE.generate(&out),
+            _ => {
+                let mut command = FIXTURE.command("generate");
+                command.arg(FIXTURE.path("run")).arg("--out").arg(&out);
+                command.arg("--music").arg(FIXTURE.file(0, "wav"));
+                command
+            }
+        };
+        let output = command.args([option, &value]).assert().failure();
+        output.stderr(contains("another rest pose").and(contains("degrees")));
+        assert!(!out.exists(), "{option}");
+    }
 }
 
 #[test]

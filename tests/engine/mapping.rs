@@ -45,6 +45,7 @@ fn mapped_joints_have_the_world_transforms_of_their_sources() {
         ("Head", "\"Head/End Site 2\""),
         ("Spine2", "{ between = [\"Spine1\", \"Neck\"], at = 0.25 }"),
         ("LeftArm", "\"RightArm\""),
+        ("RightArm", "\"LeftArm\""),
     ];
     let mapped = Mapping::parse(&mapping("scale = 2.0", &changed), "map.toml")
         .unwrap()
@@ -65,6 +66,7 @@ fn mapped_joints_have_the_world_transforms_of_their_sources() {
                     rotations[10].slerp(rotations[22], 0.25),
                 ),
                 "LeftArm" => (positions[15], rotations[15]),
+                "RightArm" => (positions[19], rotations[19]),
                 _ => (positions[joint], rotations[joint]),
             };
             assert!(

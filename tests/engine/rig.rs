@@ -120,6 +120,40 @@ fn the_mapping_of_the_cmu_clips_spreads_a_spine_of_two_joints_and_finds_all_othe
 }
 
 #[test]
+fn a_rig_without_hands_has_its_arms_and_its_trunk_all_the_same() {
+    let body = RIGS[0].body();
+    let joints = body.skeleton.joints.iter();
+    let first_hand = |side: &str| {
+        joints
+            .clone()
+            .position(|it| it.name.ends_with(side))
+            .unwrap()
+    };
+    let hands = ["LeftHand", "RightHand"].map(first_hand);
+    let mut skeleton = Skeleton { joints: Vec::new() };
+    let mut places = BTreeMap::new();
+    for (index, joint) in body.skeleton.joints.iter().enumerate() {
+        let parent = joint.parent.map(|parent| places.get(&parent).copied());
+        if hands.contains(&index) || parent == Some(None) {
+            continue;
+        }
+        places.insert(index, skeleton.len());
+        let mut joint = joint.clone();
+        joint.parent = parent.flatten();
+        if joint.name.ends_with("ForeArm") {
+            joint.end_sites = vec![DVec3::X];
+        }
+        skeleton.joints.push(joint);
+    }
+    let mut expected = body.sources.clone();
+    for side in ["Left", "Right"] {
+        let forearm = expected[&format!("{side}ForeArm")].clone();
+        expected.insert(format!("{side}Hand"), format!("{forearm}/End Site"));
+    }
+    assert_eq!(recognised(&skeleton), expected);
+}
+
+#[test]
 fn what_is_not_found_is_named_and_stands_in_the_mapping_file_to_be_filled_in() {
     let mut skeleton = RIGS[0].body().skeleton;
     for joint in &mut skeleton.joints {

@@ -5,16 +5,20 @@ use ndarray::{ArrayD, IxDyn};
 
 use crate::models::weights::{SavedWeights, WeightsError};
 use crate::models::{ModelError, Statistics};
+use crate::motion::rest_pose::{other_rest_pose, rest_directions};
 use crate::motion::{Joint, Skeleton};
 
 const PARENTS: &str = "skeleton.parents";
 const NAMES: &str = "skeleton.names";
+const DIRECTIONS: &str = "skeleton.directions";
 
-/// Names and parents of J joints; every dancer has bones of their own.
+/// Names, parents and directions at rest of J joints; every dancer has bones of their own length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     /// All offsets are 0.
     skeleton: Skeleton,
+    /// As [`rest_directions`] gives them; empty where weights of an earlier version do not tell.
+    directions: Vec<DVec3>,
 }
 
 impl Body {
@@ -28,6 +32,7 @@ impl Body {
             skeleton: Skeleton {
                 joints: joints.collect(),
             },
+            directions: rest_directions(skeleton),
         }
     }
 
@@ -68,7 +73,7 @@ impl Body {
             .collect()
     }
 
-    /// Refuses a skeleton with other joints; `name` is what an error calls it.
+    /// Refuses a skeleton with other joints or another rest pose; `name` is what an error calls it.
     ///
     /// # Errors
     /// The first joint that differs.
@@ -76,7 +81,9 @@ impl Body {
         let own = Self::of(skeleton);
         let (ours, theirs) = (&self.skeleton.joints, &own.skeleton.joints);
         let at = (0..ours.len().max(theirs.len())).find(|&k| ours.get(k) != theirs.get(k));
-        let Some(at) = at else { return Ok(()) };
+        let Some(at) = at else {
+            return self.check_rest(name, &own);
+        };
         let title = |joints: &[Joint]| match joints.get(at) {
             None => "no such joint".to_string(),
             Some(joint) => match joint.parent {
@@ -96,8 +103,26 @@ impl Body {
         })
     }
 
-    /// As numbers that are saved beside the weights: parents (-1: none), and the names as UTF-8
-    /// bytes with a line end after each.
+    /// Refuses another rest pose than that of the clips that the model was trained on.
+    fn check_rest(&self, name: &str, other: &Self) -> Result<(), ModelError> {
+        let Some((at, apart)) = other_rest_pose(&self.directions, &other.directions) else {
+            return Ok(());
+        };
+        Err(ModelError::Data {
+            reason: format!(
+                "{name} has another rest pose than the clips that the model was trained on: the \
+                 bone to {} points along {:.1} there, {:.1} here, {:.0} degrees apart, so that \
+                 rotations mean other poses; give a file with the model's rest pose",
+                self.skeleton.joints[at].name,
+                other.directions[at],
+                self.directions[at],
+                apart.to_degrees(),
+            ),
+        })
+    }
+
+    /// As numbers that are saved beside the weights: parents (-1: none), the names as UTF-8 bytes
+    /// with a line end after each, and directions.
     pub(in crate::models) fn statistics(&self, statistics: Statistics) -> Statistics {
         let parents = self.parents().into_iter();
         let parents: Vec<f64> = parents
@@ -106,9 +131,16 @@ impl Body {
         let joints = self.skeleton.joints.iter();
         let names: String = joints.map(|joint| format!("{}\n", joint.name)).collect();
         let names: Vec<f64> = names.bytes().map(f64::from).collect();
-        statistics
+        let statistics = statistics
             .with(PARENTS, array(parents))
-            .with(NAMES, array(names))
+            .with(NAMES, array(names));
+        match self.directions.is_empty() {
+            true => statistics,
+            false => {
+                let directions = self.directions.iter().flat_map(DVec3::to_array);
+                statistics.with(DIRECTIONS, array(directions.collect()))
+            }
+        }
     }
 
     /// The body that is saved beside weights.
@@ -140,10 +172,18 @@ impl Body {
                 false => Err(refused("has a joint before its parent")),
             }
         });
+        let skeleton = Skeleton {
+            joints: joints.collect::<Result<_, _>>()?,
+        };
+        let directions = match saved.has(DIRECTIONS) {
+            true => saved.statistic(DIRECTIONS, &[3 * skeleton.len()])?,
+            false => ArrayD::zeros(IxDyn(&[0])),
+        };
+        let directions: Vec<f64> = directions.into_iter().collect();
+        let directions = directions.as_chunks().0.iter();
         Ok(Self {
-            skeleton: Skeleton {
-                joints: joints.collect::<Result<_, _>>()?,
-            },
+            skeleton,
+            directions: directions.map(|&axes| DVec3::from_array(axes)).collect(),
         })
     }
 }

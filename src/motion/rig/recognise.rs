@@ -18,8 +18,14 @@ pub struct Recognised {
     pub others: Vec<String>,
 }
 
-/// The joints of a leg or an arm from the trunk outwards; none where one was not found.
-type Limb = Option<[usize; 3]>;
+/// The joints of a leg or an arm from the trunk outwards.
+#[derive(Debug, Clone, Copy)]
+struct Limb {
+    upper: usize,
+    lower: usize,
+    /// Foot or hand; a rig may lack it.
+    end: Option<usize>,
+}
 
 impl Recognised {
     /// Finds the limbs by the names of their joints, with any prefix, and the trunk by where the
@@ -40,25 +46,33 @@ impl Recognised {
         let legs = sides.map(|(side, _)| body.leg(side));
         let arms = sides.map(|(side, _)| body.arm(side));
         for (place, (side, word)) in sides.into_iter().enumerate() {
-            if let Some(leg) = legs[place] {
-                for (part, joint) in ["UpLeg", "Leg", "Foot"].into_iter().zip(leg) {
-                    set(&format!("{word}{part}"), Some(name(joint)));
-                }
-                set(&format!("{word}ToeBase"), Some(body.toe(side, leg[2])));
+            if let Some(Limb { upper, lower, end }) = legs[place] {
+                set(&format!("{word}UpLeg"), Some(name(upper)));
+                set(&format!("{word}Leg"), Some(name(lower)));
+                set(&format!("{word}Foot"), end.map(name));
+                set(
+                    &format!("{word}ToeBase"),
+                    end.map(|foot| body.toe(side, foot)),
+                );
             }
-            if let Some(arm) = arms[place] {
-                let collar = body.collar(side, arm[0]);
-                set(&format!("{word}Shoulder"), Some(name(collar)));
-                for (part, joint) in ["Arm", "ForeArm", "Hand"].into_iter().zip(arm) {
-                    set(&format!("{word}{part}"), Some(name(joint)));
-                }
+            if let Some(Limb { upper, lower, end }) = arms[place] {
+                set(
+                    &format!("{word}Shoulder"),
+                    Some(name(body.collar(side, upper))),
+                );
+                set(&format!("{word}Arm"), Some(name(upper)));
+                set(&format!("{word}ForeArm"), Some(name(lower)));
+                set(
+                    &format!("{word}Hand"),
+                    end.map(name).or_else(|| body.end_site(lower)),
+                );
             }
         }
         if let [Some(left), Some(right)] = legs {
-            let hips = body.meeting(left[0], right[0]);
+            let hips = body.meeting(left.upper, right.upper);
             set("Hips", hips.map(name));
             if let (Some(hips), [Some(left), Some(right)]) = (hips, arms) {
-                let chest = body.meeting(left[0], right[0]);
+                let chest = body.meeting(left.upper, right.upper);
                 let trunk = chest.and_then(|chest| body.trunk(hips, chest));
                 if let Some((chest, spine)) = chest.zip(trunk) {
                     for (place, joint) in SPINE.into_iter().enumerate() {
@@ -180,12 +194,37 @@ impl<'s> Body<'s> {
     }
 
     /// Thigh, shin and foot of a side.
-    fn leg(&self, side: Side) -> Limb {
-        self.uppermost(Some(side), &[Part::Foot]).find_map(|foot| {
-            let shin = self.above(foot, side, &[Part::Shin])?;
-            let thigh = self.above(shin, side, &[Part::Thigh, Part::Shin])?;
-            Some([thigh, shin, foot])
-        })
+    fn leg(&self, side: Side) -> Option<Limb> {
+        self.limb(side, Part::Foot, Part::Shin, &[Part::Thigh, Part::Shin])
+    }
+
+    /// A limb by its end or, where the rig has none, by the lower of its bones.
+    fn limb(&self, side: Side, end: Part, lower: Part, uppers: &[Part]) -> Option<Limb> {
+        let (ends, lowers) = ([end], [lower]);
+        let mut found = self.uppermost(Some(side), &ends);
+        let whole = found.find_map(|end| {
+            let lower = self.above(end, side, &lowers)?;
+            let upper = self.above(lower, side, uppers)?;
+            let end = Some(end);
+            Some(Limb { upper, lower, end })
+        });
+        let endless = || {
+            let is_lower = |&it: &usize| self.names[it].is(Some(side), &lowers);
+            let mut lowers = (0..self.skeleton.len()).filter(is_lower);
+            lowers.find_map(|lower| {
+                let upper = self.above(lower, side, uppers)?;
+                let end = None;
+                Some(Limb { upper, lower, end })
+            })
+        };
+        whole.or_else(endless)
+    }
+
+    /// The End Site of a joint as a mapping file names it, where there is one.
+    fn end_site(&self, joint: usize) -> Option<String> {
+        let joint = &self.skeleton.joints[joint];
+        let has_end = !joint.end_sites.is_empty();
+        has_end.then(|| format!("{}/End Site", joint.name))
     }
 
     /// What ends a foot: a toe, any joint on the foot, the foot's End Site, the foot itself.
@@ -194,21 +233,16 @@ impl<'s> Body<'s> {
         let below = |&joint: &usize| self.upwards(joint).skip(1).any(|above| above == foot);
         let mut below = (0..self.skeleton.len()).filter(below);
         let toe = below.find(|&it| names[it].is(Some(side), &[Part::Toe, Part::Foot]));
-        let joint = &self.skeleton.joints[foot];
-        match toe.or_else(|| self.children(foot).next()) {
-            Some(toe) => self.skeleton.joints[toe].name.clone(),
-            None if joint.end_sites.is_empty() => joint.name.clone(),
-            None => format!("{}/End Site", joint.name),
-        }
+        let toe = toe.or_else(|| self.children(foot).next());
+        let name = |joint: usize| self.skeleton.joints[joint].name.clone();
+        let end = toe.map(name).or_else(|| self.end_site(foot));
+        end.unwrap_or_else(|| name(foot))
     }
 
     /// Upper arm, forearm and hand of a side.
-    fn arm(&self, side: Side) -> Limb {
-        self.uppermost(Some(side), &[Part::Hand]).find_map(|hand| {
-            let forearm = self.above(hand, side, &[Part::Forearm])?;
-            let upper = self.above(forearm, side, &[Part::UpperArm, Part::Shoulder])?;
-            Some([upper, forearm, hand])
-        })
+    fn arm(&self, side: Side) -> Option<Limb> {
+        let uppers = [Part::UpperArm, Part::Shoulder];
+        self.limb(side, Part::Hand, Part::Forearm, &uppers)
     }
 
     /// The joint that carries an upper arm: its collar bone, or the upper arm itself.
