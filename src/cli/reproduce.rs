@@ -32,6 +32,9 @@ use crate::training::{Resumed, Trainer, TrainingError};
 /// checkpoint, also after a kill; the end is the same to the bit as without the break. Tables are
 /// written again after every row; rows that are missing show "—". Ctrl-C stops training and
 /// evaluation; the same command goes on.
+///
+/// On several machines that share OUT and RUNS, each --task K of those that --list names may run at
+/// the same time; afterwards --no-training writes the tables.
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
     /// Folder of configs, such as experiments/pan2021
@@ -63,6 +66,13 @@ pub struct ReproduceArgs {
     /// Train nothing: evaluate the runs that are finished and write the tables
     #[arg(long)]
     no_training: bool,
+    /// Print the tasks that the rows fall into, and end: number, core hours that are left to train as
+    /// busy as the machine is, rows; rows that share a training are one task
+    #[arg(long, conflicts_with_all = ["task", "no_training"])]
+    list: bool,
+    /// Train and evaluate the rows of this task of --list alone, and write no tables
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    task: Option<u32>,
     /// Rows to train at the same time, the threads shared among them; no number in the result
     /// depends on it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
@@ -100,7 +110,7 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         alone: args.jobs == 1,
         stop: Stop::on_signal(format!("stopped and saved; go on with\n  {}", command()))?,
     };
-    let reproduction = Reproduction {
+    let mut reproduction = Reproduction {
         rows: &rows,
         chosen: &chosen,
         dataset: &dataset,
@@ -110,9 +120,25 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         threads: args.threads.shared(args.jobs).count(),
         jobs: args.jobs.into(),
         no_training: args.no_training,
+        tables: args.task.is_none(),
         observer: &terminal,
     };
     reproduction.check_out(args.force)?;
+    if args.list {
+        reproduction.threads = 1;
+        return list(&reproduction);
+    }
+    let tasks = reproduction.tasks()?;
+    if let Some(task) = args.task {
+        let rows = tasks.get(task as usize - 1);
+        let none = || {
+            anyhow!(
+                "--task {task}: there are {}; --list names them",
+                tasks.len()
+            )
+        };
+        reproduction.chosen = rows.ok_or_else(none)?;
+    }
     let ending = reproduction.run().map_err(|error| match error {
         // By itself: whether the output is closed is seen from its kind.
         ReproduceError::Output(error) => error.into(),
@@ -126,6 +152,21 @@ pub fn run(args: ReproduceArgs) -> anyhow::Result<ExitCode> {
         Ending::Stopped => Ok(interrupted(&terminal.stop.farewell)),
         Ending::Diverged(error) => Err(anyhow::Error::new(error).context("a training diverged")),
     }
+}
+
+/// Prints the tasks, one a line.
+fn list(reproduction: &Reproduction<'_>) -> anyhow::Result<ExitCode> {
+    for (index, rows) in reproduction.tasks()?.into_iter().enumerate() {
+        let hours = reproduction.expected(&rows)?.as_secs_f64() / 3600.0;
+        let names: Vec<&str> = rows.iter().map(|row| row.folder.as_str()).collect();
+        writeln!(
+            io::stdout(),
+            "{}\t{hours:.2}\t{}",
+            index + 1,
+            names.join(",")
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Says on the terminal how it goes, and stops on Ctrl-C.

@@ -12,6 +12,7 @@ mod reproduce;
 mod results;
 pub mod rows;
 mod scoring;
+mod tasks;
 
 pub use config::{CheckpointConfig, ExperimentConfig, LogConfig, ValidationConfig};
 pub use curves::Curves;

@@ -112,6 +112,9 @@ impl Reproduction<'_> {
     /// # Errors
     /// A file cannot be read or written.
     pub(super) fn report(&self) -> Result<(), ReproduceError> {
+        if !self.tables {
+            return Ok(());
+        }
         let reported = self.rows.iter().map(|row| self.reported(row));
         let rows: Vec<Reported<'_>> = reported.collect::<Result<_, _>>()?;
         let Some(record) = rows.iter().find_map(|reported| reported.record.as_ref()) else {

@@ -81,6 +81,9 @@ pub struct Reproduction<'a> {
     pub jobs: usize,
     /// Only runs that are finished are evaluated.
     pub no_training: bool,
+    /// Whether tables are written: not by one of several tasks, whose tables would have the rows
+    /// that others are at.
+    pub tables: bool,
     pub observer: &'a dyn Observer,
 }
 
@@ -95,7 +98,7 @@ pub enum Ending {
     Diverged(TrainingError),
 }
 
-impl Reproduction<'_> {
+impl<'a> Reproduction<'a> {
     /// Trains and evaluates what is left of the chosen rows, and writes the tables again after
     /// each.
     ///
@@ -167,7 +170,7 @@ impl Reproduction<'_> {
 
     /// The first of the rows, by number, that is trained as this one is: rows that differ only in
     /// what acts after the network share a training.
-    fn trained_as(&self, row: &Row) -> Result<usize, ReproduceError> {
+    pub(super) fn trained_as(&self, row: &Row) -> Result<usize, ReproduceError> {
         for (number, other) in self.rows.iter().enumerate() {
             let mut differences = other.config.training_differences(&row.config)?;
             differences.retain(|difference| !difference.starts_with("name:"));
@@ -268,7 +271,7 @@ impl Reproduction<'_> {
     }
 
     /// The row whose weights another one starts from.
-    fn start_of(&self, row: &Row) -> Result<Option<(usize, &Row)>, ReproduceError> {
+    pub(super) fn start_of(&self, row: &Row) -> Result<Option<(usize, &'a Row)>, ReproduceError> {
         let Some(name) = &row.config.start else {
             return Ok(None);
         };
@@ -336,6 +339,6 @@ impl Reproduction<'_> {
     }
 }
 
-fn is_finished(manifest: Option<&Manifest>) -> bool {
+pub(super) fn is_finished(manifest: Option<&Manifest>) -> bool {
     manifest.is_some_and(|manifest| manifest.state == RunState::Finished)
 }

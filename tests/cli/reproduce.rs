@@ -397,6 +397,69 @@ fn rows_trained_at_the_same_time_end_as_one_after_the_other() {
 }
 
 #[test]
+fn tasks_in_processes_of_their_own_at_the_same_time_make_the_tables_of_one() {
+    let place = TempDir::new().unwrap();
+    // Refined or not, weights are the same: one task.
+    let configs = place.path().join("configs");
+    fs::create_dir(&configs).unwrap();
+    for file in fs::read_dir(FIXTURE.path("configs")).unwrap() {
+        let file = file.unwrap().path();
+        fs::copy(&file, configs.join(file.file_name().unwrap())).unwrap();
+    }
+    let refined = "base = 'one_lstm.toml'\nname = 'refined'\n[model]\nvelocity_refinement = true\n";
+    fs::write(configs.join("refined.toml"), refined).unwrap();
+    let command = |place: &Path| reproduce_with(place, "configs", &configs);
+    let list = |place: &Path| {
+        let output = command(place).arg("--list").assert().success();
+        let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+        let lines = text.lines().map(|line| {
+            let cells: Vec<String> = line.split('\t').map(String::from).collect();
+            (
+                cells[0].clone(),
+                cells[1].parse::<f64>().unwrap(),
+                cells[2].clone(),
+            )
+        });
+        lines.collect::<Vec<_>>()
+    };
+    let tasks = list(place.path());
+    let rows: Vec<&str> = tasks.iter().map(|(_, _, rows)| rows.as_str()).collect();
+    assert_eq!(rows, ["interpolation", "whole_model", "one_lstm,refined"]);
+    assert_eq!(tasks[0].1, 0.0);
+    let running: Vec<_> = tasks
+        .iter()
+        .map(|(number, ..)| {
+            let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("keydance"));
+            command.args(arguments(place.path()).into_iter().map(|argument| {
+                match argument == FIXTURE.path("configs") {
+                    true => configs.clone(),
+                    false => argument,
+                }
+            }));
+            command.args(["--task", number, "--threads", "1"]);
+            command.stdout(std::process::Stdio::null()).spawn().unwrap()
+        })
+        .collect();
+    for mut task in running {
+        assert!(task.wait().unwrap().success());
+    }
+    assert!(!place.path().join("results/tables.md").exists());
+    let output = command(place.path())
+        .args(["--task", "4"])
+        .assert()
+        .failure();
+    output.stderr(contains("--task 4: there are 3"));
+    command(place.path())
+        .arg("--no-training")
+        .assert()
+        .success();
+    let alone = TempDir::new().unwrap();
+    command(alone.path()).assert().success();
+    let tables = |place: &Path| fs::read_to_string(place.join("results/tables.md")).unwrap();
+    assert_eq!(tables(place.path()), tables(alone.path()));
+}
+
+#[test]
 fn rows_that_could_not_be_trained_are_refused_before_any_is() {
     let place = TempDir::new().unwrap();
     for (set, words) in [

@@ -201,6 +201,7 @@ fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {
         threads: 2,
         jobs: 1,
         no_training: false,
+        tables: true,
         observer: &Silent,
     };
     assert!(matches!(reproduction.run().unwrap(), Ending::Finished));
