@@ -5,7 +5,7 @@ use super::config::DataConfig;
 use super::dataset::{DataError, Recording};
 use crate::counted::counted;
 use crate::motion::frame_rate::meant_rate;
-use crate::motion::oddities::{backward_toes, oddities};
+use crate::motion::oddities::{oddities, swapped_sides};
 use crate::motion::units::to_cm_and_y_up;
 use crate::motion::{Clip, Conversion, Mapping, Unit, Up, resample};
 
@@ -42,7 +42,7 @@ impl FileReading {
             None => (config.unit, config.up),
         };
         notices.extend(to_cm_and_y_up(&mut clip, unit, up));
-        notices.extend(mapping.and_then(|_| backward_toes(&clip)));
+        notices.extend(mapping.and_then(|_| swapped_sides(&clip)));
         Ok(Self {
             recording: Recording::of(clip),
             notices,

@@ -31,6 +31,21 @@ impl Floor {
         }
     }
 
+    /// The floor of a dancer who mostly stands on it: the lowest ankle and the lowest toe of the frame
+    /// in the middle, by height; lower ones may have been measured wrong. As [`Floor::under`].
+    pub fn usual(world: &[Vec<DVec3>], feet: &Feet) -> Self {
+        let middle = |joints: [usize; 2]| {
+            let lowest = |frame: &Vec<DVec3>| frame[joints[0]].y.min(frame[joints[1]].y);
+            let mut heights: Vec<f64> = world.iter().map(lowest).collect();
+            heights.sort_by(f64::total_cmp);
+            heights.get(heights.len() / 2).copied()
+        };
+        Self {
+            ankle: middle(feet.ankles).unwrap_or(f64::INFINITY),
+            toe: middle(feet.toes).unwrap_or(f64::INFINITY),
+        }
+    }
+
     /// The lower of two floors.
     #[must_use]
     pub fn or_lower(self, other: Self) -> Self {

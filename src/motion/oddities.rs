@@ -15,6 +15,8 @@ const LEAST_JUMP: f64 = 0.15;
 /// How long a beginning lasts, s, and the share of a clip that it is at most.
 const BEGINNING: f64 = 1.0;
 const BEGINNING_SHARE: f64 = 0.25;
+/// A leg stands whose hip is this share of its length above its ankle.
+const UPRIGHT: f64 = 0.8;
 /// How many joints a notice names.
 const NAMED: usize = 3;
 
@@ -26,21 +28,35 @@ pub fn oddities(clip: &Clip) -> Vec<String> {
         .collect()
 }
 
-/// Toes that point backwards by where hips and arms are: left and right of a mapping are swapped.
-pub fn backward_toes(clip: &Clip) -> Option<String> {
+/// What a mapping with left and right swapped makes of a clip: toes that point backwards, by where
+/// hips and arms are, while the dancer stands; or, where only legs or only arms are swapped, hips
+/// and shoulders that face opposite ways.
+pub fn swapped_sides(clip: &Clip) -> Option<String> {
     let feet = Feet::of(&clip.skeleton).ok()?;
     let body = FacingJoints::of(&clip.skeleton).ok()?;
-    let ahead = clip.poses.iter().map(|pose| {
+    let [mut ahead, mut alike] = [0.0; 2];
+    for pose in &clip.poses {
         let world = pose.world_positions(&clip.skeleton);
+        let across = |[left, right]: [usize; 2]| world[left] - world[right];
+        alike += across(body.hips).dot(across(body.arms));
         let angle = body.angle(&world);
         let forward = DVec3::new(angle.sin(), 0.0, angle.cos());
-        let pairs = feet.ankles.into_iter().zip(feet.toes);
-        let of_foot = pairs.map(|(ankle, toe)| (world[toe] - world[ankle]).dot(forward));
-        of_foot.sum::<f64>()
-    });
-    (ahead.sum::<f64>() < 0.0).then(|| {
-        "the toes point backwards: left and right may be swapped in its mapping".to_string()
-    })
+        for side in 0..2 {
+            let (hip, ankle) = (body.hips[1 - side], feet.ankles[side]);
+            let leg = world[hip] - world[ankle];
+            if leg.y > UPRIGHT * leg.length() {
+                ahead += (world[feet.toes[side]] - world[ankle]).dot(forward);
+            }
+        }
+    }
+    let what = match () {
+        () if alike < 0.0 => "hips and shoulders face opposite ways",
+        () if ahead < 0.0 => "the toes point backwards",
+        () => return None,
+    };
+    Some(format!(
+        "{what}: left and right may be swapped in its mapping"
+    ))
 }
 
 /// Joints that stand on their parents in every frame though their offsets do not: position channels

@@ -10,9 +10,10 @@
 
 use std::ops::Range;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
-use crate::motion::ik::two_bone;
+use super::knee::Knee;
+use super::leg::Leg;
 use crate::motion::{Feet, Floor, ON_FLOOR, Pose, Skeleton};
 
 /// Frames over which a correction comes before a contact and goes after it.
@@ -28,13 +29,9 @@ const GAP: usize = 2;
 /// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held
 /// at another place from then on.
 const HELD: f64 = 25.0;
-/// From this share of its length on a leg is stretched less than a place asks: before it is straight
-/// its knee snaps.
-const SOFT: f64 = 0.97;
-/// Corrections below this are none, cm.
-const STILL: f64 = 1e-9;
-/// Bones below this have no direction, cm.
-const SHORTEST_BONE: f64 = 1e-6;
+/// A toe is held less where that would bring it further than this from where the ankle takes it, cm,
+/// and not at all beyond the second: heel and toe that are held at odds would turn the foot about.
+const AT_ODDS: [f64; 2] = [4.0, 12.0];
 
 /// Frames `from..to` in which a joint stands, and the keyframe among them whose place it keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,37 +58,62 @@ pub(super) fn pin_feet(
     floor: &Floor,
     keyframes: &[usize],
 ) {
+    hold_feet(skeleton, poses, feet, floor, |path, floor| {
+        Hold::on_floor(path, floor, keyframes)
+    });
+}
+
+/// Lifts feet that are below the floor: between the frames in which [`pin_feet`] has pinned them.
+pub(super) fn lift_feet(
+    skeleton: &Skeleton,
+    poses: &mut [Pose],
+    feet: &Feet,
+    floor: &Floor,
+    keyframes: &[usize],
+) {
+    hold_feet(skeleton, poses, feet, floor, |path, floor| {
+        let lifts = lift(path, floor, keyframes, LAST_EASE).into_iter();
+        Hold {
+            correction: lifts.map(|lift| lift * DVec3::Y).collect(),
+            weight: vec![0.0; path.len()],
+        }
+    });
+}
+
+/// Moves ankles and toes as `hold` says of a path, `[F]`, and the height of the floor under it.
+fn hold_feet(
+    skeleton: &Skeleton,
+    poses: &mut [Pose],
+    feet: &Feet,
+    floor: &Floor,
+    hold: impl Fn(&[DVec3], f64) -> Hold,
+) {
     for (ankle, toe) in feet.ankles.into_iter().zip(feet.toes) {
-        let Some(leg) = leg(skeleton, ankle, toe) else {
+        let Some(leg) = Leg::of(skeleton, ankle, toe) else {
             continue;
         };
         let world = skeleton.world_positions(poses);
-        let hold = |joint: usize, floor: f64| {
-            let path: Vec<DVec3> = world.iter().map(|world| world[joint]).collect();
-            Hold::on_floor(&path, floor, keyframes)
-        };
-        let ankle = hold(leg[2], floor.ankle);
-        let toe = hold(leg[3], floor.toe);
+        let path = |joint: usize| -> Vec<DVec3> { world.iter().map(|it| it[joint]).collect() };
+        let ankle = hold(&path(leg.ankle), floor.ankle);
+        let toe = hold(&path(leg.toe), floor.toe);
+        let knees = Knee::of_frames(&leg, &world);
         for (frame, pose) in poses.iter_mut().enumerate() {
-            if keyframes.contains(&frame) {
+            let (at_toe, stands) = (toe.correction[frame], toe.weight[frame]);
+            // A toe that stands alone takes the ankle along.
+            let alone = stands * (1.0 - ankle.weight[frame]);
+            let moved = ankle.correction[frame] + alone * at_toe;
+            let moved = moved + leg.rise(&world[frame], moved, floor.toe) * DVec3::Y;
+            let is_above = world[frame][leg.toe].y + moved.y >= floor.toe;
+            if moved == DVec3::ZERO && stands == 0.0 && is_above {
                 continue;
             }
-            // A toe that stands alone takes the ankle along.
-            let alone = toe.weight[frame] * (1.0 - ankle.weight[frame]);
-            let moved = ankle.correction[frame] + alone * toe.correction[frame];
-            if moved.length() > STILL {
-                move_ankle(skeleton, pose, &leg, moved);
-            }
-            let stands = world[frame][leg[3]] + toe.correction[frame];
-            aim_foot(skeleton, pose, &leg, (stands, toe.weight[frame]), floor.toe);
+            leg.move_ankle(skeleton, pose, moved, &knees[frame]);
+            let odds = (at_toe - moved).length() - AT_ODDS[0];
+            let share = stands * smooth(1.0 - odds / (AT_ODDS[1] - AT_ODDS[0]));
+            let place = world[frame][leg.toe] + at_toe;
+            leg.aim_foot(skeleton, pose, (place, share), floor.toe);
         }
     }
-}
-
-/// Hip, knee, ankle and toe of a leg with this ankle and toe, where the skeleton has one.
-fn leg(skeleton: &Skeleton, ankle: usize, toe: usize) -> Option<[usize; 4]> {
-    let knee = skeleton.joints[ankle].parent?;
-    Some([skeleton.joints[knee].parent?, knee, ankle, toe])
 }
 
 /// In which frames a joint is near its floor and slow.
@@ -289,85 +311,6 @@ impl Hold {
 fn smooth(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
-}
-
-/// Moves the ankle by two-bone inverse kinematics; the foot keeps its direction in the world.
-fn move_ankle(skeleton: &Skeleton, pose: &mut Pose, joints: &[usize; 4], moved: DVec3) {
-    let [hip, knee, ankle, _] = *joints;
-    let (positions, rotations) = pose.world(skeleton);
-    let upper = positions[knee] - positions[hip];
-    let lower = positions[ankle] - positions[knee];
-    if upper.length() < SHORTEST_BONE || lower.length() < SHORTEST_BONE {
-        return;
-    }
-    let to_place = positions[ankle] + moved - positions[hip];
-    let now = positions[ankle].distance(positions[hip]);
-    let reach = soft_reach(to_place.length(), now, upper.length() + lower.length());
-    let limb = two_bone(
-        positions[hip],
-        positions[hip] + reach * to_place.normalize_or_zero(),
-        upper.length(),
-        lower.length(),
-        positions[knee] - 0.5 * (positions[hip] + positions[ankle]),
-    );
-    let arc = |from: DVec3, to: DVec3| DQuat::from_rotation_arc(from.normalize(), to.normalize());
-    let swing = arc(upper, limb.middle - positions[hip]);
-    let thigh = swing * rotations[hip];
-    let shin = arc(swing * lower, limb.end - limb.middle) * swing * rotations[knee];
-    let parent = skeleton.joints[hip]
-        .parent
-        .map_or(DQuat::IDENTITY, |parent| rotations[parent]);
-    pose.rotations[hip] = (parent.inverse() * thigh).normalize();
-    pose.rotations[knee] = (thigh.inverse() * shin).normalize();
-    pose.rotations[ankle] = (shin.inverse() * rotations[ankle]).normalize();
-}
-
-/// How far from the hip an ankle comes that wants to be so far and is `now`: as far as it is at
-/// least, and never quite as far as the leg is long.
-fn soft_reach(wanted: f64, now: f64, length: f64) -> f64 {
-    let (soft, room) = (SOFT * length, (1.0 - SOFT) * length);
-    let eased = match wanted > soft {
-        true => soft + room * (1.0 - (-(wanted - soft) / room).exp()),
-        false => wanted,
-    };
-    eased.max(wanted.min(now))
-}
-
-/// Turns the foot so that its toe points at a place as much as it stands there, 0 to 1, and is not
-/// below the floor.
-fn aim_foot(
-    skeleton: &Skeleton,
-    pose: &mut Pose,
-    joints: &[usize; 4],
-    (place, stands): (DVec3, f64),
-    floor: f64,
-) {
-    let [_, knee, ankle, toe] = *joints;
-    let (positions, rotations) = pose.world(skeleton);
-    let now = positions[toe] - positions[ankle];
-    let wanted = positions[toe].lerp(place, stands) - positions[ankle];
-    let length = now.length();
-    if length < SHORTEST_BONE || wanted.length() < SHORTEST_BONE {
-        return;
-    }
-    let wanted = not_below(length * wanted.normalize(), floor - positions[ankle].y);
-    if wanted.distance(now) > STILL {
-        let turn = DQuat::from_rotation_arc(now.normalize(), wanted.normalize());
-        pose.rotations[ankle] = (rotations[knee].inverse() * turn * rotations[ankle]).normalize();
-    }
-}
-
-/// A bone of the same length whose end is not below a height, both from its begin; straight up where
-/// it is too short for that.
-fn not_below(bone: DVec3, height: f64) -> DVec3 {
-    let length = bone.length();
-    if bone.y >= height {
-        return bone;
-    }
-    let y = height.min(length);
-    let along = (length * length - y * y).max(0.0).sqrt();
-    let level = DVec3::new(bone.x, 0.0, bone.z).normalize_or(DVec3::Z);
-    along * level + y * DVec3::Y
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ndarray::{Array2, ArrayView2, s};
 
+use super::foot_cleanup::lift_feet;
 pub use super::keyframe_choice::{
     FileFrom, FileKeyframe, KeyframeChoice, LONGEST, Time, TimedFrame,
 };
@@ -19,7 +20,7 @@ use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
 use crate::motion::oddities::oddities;
 use crate::motion::rig::{RigKeyframe, nearest_frames, spread};
-use crate::motion::{Clip, Mapping, MappingError};
+use crate::motion::{Clip, Feet, Floor, Mapping, MappingError};
 
 /// Channels of a joint that has none of its own.
 const ORDER: [Axis; 3] = [Axis::Z, Axis::X, Axis::Y];
@@ -429,23 +430,32 @@ impl Keyframes {
 
     /// A result, whose keyframes are at `times`, as a file's content: on the rig of the first
     /// keyframe's file, in its unit, axis and rate; or, from a file on the dance skeleton, with its
-    /// channels, or with Z X Y rotations where these cannot hold it.
+    /// channels, or with Z X Y rotations where these cannot hold it. Feet that were pinned to a floor
+    /// are above it at that rate, too.
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
-    pub fn document(&self, result: &Clip, times: &[usize]) -> Result<Bvh, BvhError> {
+    pub fn document(
+        &self,
+        result: &Clip,
+        times: &[usize],
+        pinned_to: Option<&(Feet, Floor)>,
+    ) -> Result<Bvh, BvhError> {
         let first = self.keyframes.first();
         let Some(first) = first.map(|first| &self.sources[&first.file]) else {
             return Bvh::from_clip(result, channel_layout(result, ORDER));
         };
-        let clip = match &first.rig {
-            Some(own) => own.motion(result, &self.on_rig(own, times)),
-            None => result.clone(),
-        };
-        let clip = match self.times_in_document(times) {
-            Some((own_times, frame_time)) => spread(clip, times, &own_times, frame_time),
-            None => clip,
-        };
+        let (mut clip, mut times) = (result.clone(), times.to_vec());
+        if let Some((own_times, frame_time)) = self.times_in_document(&times) {
+            clip = spread(clip, &times, &own_times, frame_time);
+            times = own_times;
+            if let Some((feet, floor)) = pinned_to {
+                lift_feet(&clip.skeleton, &mut clip.poses, feet, floor, &times);
+            }
+        }
+        if let Some(own) = &first.rig {
+            clip = own.motion(&clip, &self.on_rig(own, &times));
+        }
         let channels = match &first.rig {
             Some(own) => own.channels(&clip),
             None => {

@@ -14,6 +14,8 @@ mod error;
 mod foot_cleanup;
 mod keyframe_choice;
 pub mod keyframes;
+mod knee;
+mod leg;
 mod motion;
 mod own_frames;
 mod own_rig;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use ndarray::{Array2, s};
 
 use super::SynthesisError;
@@ -50,7 +51,8 @@ pub struct SequenceRequest {
     pub root_trajectory: Array2<f64>,
     /// Velocity factors wanted, `[F, 5]`, cm/frame.
     pub velocity_factors: Array2<f64>,
-    /// The floor under the clips that the keyframes come from; none on a skeleton without feet.
+    /// Where the keyframes stand; none on a skeleton without feet. Where they are those of a clip, as
+    /// low as its feet come between them, else as low as the feet usually are in their clips.
     pub floor: Option<Floor>,
 }
 
@@ -100,7 +102,7 @@ impl SequenceRequest {
         let floors = sources.iter().enumerate().filter_map(|(index, source)| {
             let is_seen = |seen: &KeyframeSource| std::ptr::eq(seen.clip, source.clip);
             let is_first = !sources[..index].iter().any(is_seen);
-            is_first.then(|| floor_under(source.clip, 0..source.clip.frames()))?
+            is_first.then(|| floor_of(source.clip, 0..source.clip.frames(), Floor::usual))?
         });
         let mut request = Self {
             skeleton,
@@ -151,7 +153,7 @@ impl SequenceRequest {
         let rows = clip.features.slice(s![first..end, ..]);
         self.root_trajectory = rows.slice(s![.., ROOT_POSITION]).to_owned();
         self.velocity_factors = rows.slice(s![.., VELOCITY_FACTORS]).to_owned();
-        self.floor = floor_under(clip, first..end);
+        self.floor = floor_of(clip, first..end, Floor::under);
         Ok(self)
     }
 
@@ -274,12 +276,16 @@ pub fn keyframe_of(clip: &DanceClip, frame: usize) -> Result<KeyframePose, Synth
     })
 }
 
-/// The floor under some frames of a clip.
-fn floor_under(clip: &DanceClip, frames: Range<usize>) -> Option<Floor> {
+/// The floor of some frames of a clip.
+fn floor_of(
+    clip: &DanceClip,
+    frames: Range<usize>,
+    measure: fn(&[Vec<DVec3>], &Feet) -> Floor,
+) -> Option<Floor> {
     let DanceClip { clip, .. } = clip;
     let feet = Feet::of(&clip.skeleton).ok()?;
     let world = clip.skeleton.world_positions(clip.poses.get(frames)?);
-    Some(Floor::under(&world, &feet))
+    Some(measure(&world, &feet))
 }
 
 fn no_frame(clip: &DanceClip, frame: usize) -> SynthesisError {

@@ -64,6 +64,8 @@ pub struct Sequence {
     pub fit: FitError,
     /// None on a skeleton without feet.
     pub feet: Option<FeetOnFloor>,
+    /// What the feet were pinned to; none where they were not.
+    pub pinned_to: Option<(Feet, Floor)>,
 }
 
 /// How well feet keep to the floor: that of the request or, where a keyframe's feet are lower, the
@@ -325,7 +327,8 @@ impl<'r> Made<'r> {
         let fits = &self.fits;
         let skeleton = &self.request.skeleton;
         let keyframes = self.request.times();
-        let feet = self.floor().map(|(feet, floor)| {
+        let floor = self.floor();
+        let feet = floor.map(|(feet, floor)| {
             let toes = |poses: &[Pose]| {
                 let world = skeleton.world_positions(poses);
                 ToesOnFloor {
@@ -355,6 +358,7 @@ impl<'r> Made<'r> {
                 max: fits.iter().fold(0.0, |max, &(.., worst)| max.max(worst)),
             },
             feet,
+            pinned_to: floor.filter(|_| options.foot_cleanup),
             clip: Clip {
                 name: name.into(),
                 skeleton: skeleton.clone(),

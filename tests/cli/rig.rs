@@ -386,8 +386,57 @@ fn a_mapping_with_sides_swapped_or_one_for_both_is_told() {
         stderr(&output)
     );
     fs::remove_file(path("dance.bvh")).unwrap();
+    let output = mapped(&|joint| match joint.contains("Leg") {
+        true => {
+            let other = match joint.strip_prefix("Left") {
+                Some(part) => format!("Right{part}"),
+                None => joint.replace("Right", "Left"),
+            };
+            whole[&other].clone()
+        }
+        false => whole[joint].clone(),
+    });
+    assert!(
+        stderr(&output).contains("face opposite ways"),
+        "{}",
+        stderr(&output)
+    );
+    fs::remove_file(path("dance.bvh")).unwrap();
     let output = mapped(&|joint| whole[joint].clone());
-    assert!(!stderr(&output).contains("the toes point backwards"));
+    assert!(!stderr(&output).contains("may be swapped"));
+}
+
+#[test]
+fn pinned_feet_stay_above_the_floor_at_the_files_own_rate_and_on_its_rig() {
+    let folder = TempDir::new().unwrap();
+    let own = own_clip(0);
+    fs::write(folder.path().join("own.bvh"), own.to_text()).unwrap();
+    let sources = RIGS[0].body().sources;
+    let lowest = |file: &Bvh, frames: usize| {
+        let clip = file.to_clip();
+        let world = clip.skeleton.world_positions(&clip.poses[..frames]);
+        let toes = ["LeftToeBase", "RightToeBase"];
+        let toes = toes.map(|toe| clip.skeleton.index_of(&sources[toe]).unwrap());
+        let heights = world.iter().flat_map(|frame| toes.map(|toe| frame[toe].z));
+        100.0 * heights.fold(f64::INFINITY, f64::min)
+    };
+    let options = [
+        "--motion",
+        "own.bvh",
+        "--own-frames",
+        "--keyframes",
+        "0,17,40,60",
+    ];
+    let plain = danced(folder.path(), &options);
+    fs::remove_file(folder.path().join("dance.bvh")).unwrap();
+    let pinned = danced(folder.path(), &[&options[..], &["--foot-cleanup"]].concat());
+    assert_eq!(pinned.frames(), 61);
+    let floor = lowest(&own, 61);
+    let below = [&plain, &pinned].map(|made| floor - lowest(made, 61));
+    assert!(
+        below[0] > 0.5 && below[1] < 0.01,
+        "{below:?} cm below the floor"
+    );
 }
 
 #[test]

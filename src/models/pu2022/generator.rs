@@ -118,7 +118,7 @@ impl TrainedPu2022 {
             ..
         } = &self.reference;
         request.check(&self.name, &self.needs())?;
-        body.check("the request", &request.skeleton)?;
+        body.check("the clip that the dance goes on from", &request.skeleton)?;
         let own = request.given.iter().filter(|given| given.frame >= 0);
         let mut poses = Vec::new();
         let mut keys: Vec<(usize, &Pose)> = Vec::new();

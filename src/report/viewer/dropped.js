@@ -5,38 +5,48 @@ const page = document.documentElement.outerHTML;
 
 /** Joints (name, parent, offset, channels), seconds a frame and rows of numbers of a BVH file. */
 function parseBvh(text) {
-  const words = text.split(/\s+/).filter(Boolean);
+  const words = text.replace(/(frames|time):/gi, "$1: ").split(/\s+/).filter(Boolean);
   const joints = [];
   const open = [];
   let at = 0;
   const next = () => words[at++];
   const number = () => {
     const word = next();
-    if (word === undefined || Number.isNaN(Number(word))) throw new Error(`a number was expected, not ${word ?? "its end"}`);
+    if (word === undefined) throw new Error("it ends too early");
+    if (!Number.isFinite(Number(word))) throw new Error(`a number was expected, not ${word}`);
     return Number(word);
   };
-  if (next() !== "HIERARCHY") throw new Error("it does not begin with HIERARCHY");
-  for (let word = next(); word !== "MOTION"; word = next()) {
+  const keyword = () => next()?.toUpperCase();
+  const channel = () => {
+    const found = /^([xyz])(position|rotation)$/i.exec(next());
+    if (!found) throw new Error(`${words[at - 1]} is no channel`);
+    return found[1].toUpperCase() + found[2].toLowerCase();
+  };
+  if (keyword() !== "HIERARCHY") throw new Error("it does not begin with HIERARCHY");
+  for (let word = keyword(); word !== "MOTION"; word = keyword()) {
     if (word === undefined) throw new Error("it has no MOTION");
-    if (word === "ROOT" || word === "JOINT" || word === "End") {
+    if (["ROOT", "JOINT", "END"].includes(word)) {
       const name = [];
       while (words[at] !== "{" && at < words.length) name.push(next());
-      joints.push({ name: name.join(" "), parent: open.length ? open.at(-1) : -1, offset: [0, 0, 0], channels: [], isEnd: word === "End" });
+      joints.push({ name: name.join(" "), parent: open.length ? open.at(-1) : -1, offset: [0, 0, 0], channels: [], isEnd: word === "END" });
     } else if (word === "{") open.push(joints.length - 1);
     else if (word === "}") open.pop();
     else if (word === "OFFSET") joints[open.at(-1)].offset = [number(), number(), number()];
-    else if (word === "CHANNELS") joints[open.at(-1)].channels = Array.from({ length: number() }, next);
+    else if (word === "CHANNELS") joints[open.at(-1)].channels = Array.from({ length: number() }, channel);
     else throw new Error(`${word} is not understood`);
   }
   const value = (name) => {
-    while (at < words.length && !words[at].startsWith(name)) at++;
+    while (at < words.length && words[at].toUpperCase() !== name) at++;
     at++;
     return number();
   };
-  const [frames, frameTime] = [value("Frames"), value("Time")];
+  const [frames, frameTime] = [value("FRAMES:"), value("TIME:")];
+  if (!joints.length) throw new Error("it has no joints");
+  if (!(frames > 0)) throw new Error("it has no frames");
+  if (!(frameTime > 0)) throw new Error("its frame time is not above 0");
   const channels = joints.reduce((sum, joint) => sum + joint.channels.length, 0);
   const rows = Array.from({ length: frames }, () => Array.from({ length: channels }, number));
-  if (!joints.length || !frames || !(frameTime > 0)) throw new Error("it has no joints or no frames");
+  if (at < words.length && words[at] !== "\x1a") throw new Error(`it has more numbers than its ${frames} frames`);
   return { joints, frameTime, rows };
 }
 
@@ -78,8 +88,15 @@ function unitOf(joints) {
   return Object.entries({ m: 100, cm: 1, mm: 0.1, in: 2.54 }).reduce((best, unit) => (off(unit) < off(best) ? unit : best));
 }
 
-/** Whether Z points up: whether the head, else the last joint of the longest way up, is above the root along it. */
+/** Whether Z points up: whether feet keep to one height along it more than along Y; where that does not tell, whether the head is above the root. */
 function isZUp(joints, world) {
+  const spread = (axis) => {
+    const lowest = world.map((frame) => Math.min(...frame.map((place) => place[axis])));
+    const mean = lowest.reduce((sum, height) => sum + height, 0) / lowest.length;
+    return Math.sqrt(lowest.reduce((sum, height) => sum + (height - mean) ** 2, 0) / lowest.length);
+  };
+  const [y, z] = [spread(1), spread(2)];
+  if (z < y / 2 || y < z / 2) return z < y;
   const head = joints.findIndex(({ name }) => /head/i.test(name));
   const above = (frame, axis) => {
     const top = head < 0 ? Math.max(...frame.map((place) => place[axis])) : frame[head][axis];
@@ -116,7 +133,7 @@ function read(name, text) {
 /** What the page's scripts read, of files on one skeleton, at the first one's rate. */
 function dataOf(clips) {
   const [{ joints, frameTime }] = clips;
-  const tree = (clip) => JSON.stringify(clip.joints.map(({ name, parent }) => [name, parent]));
+  const tree = (clip) => JSON.stringify(clip.joints.map(({ name, parent, isEnd }) => [isEnd || name, parent]));
   const stranger = clips.find((clip) => tree(clip) !== tree(clips[0]));
   if (stranger) throw new Error(`${stranger.name} and ${clips[0].name} are on different skeletons; drop one of them`);
   const atRate = ({ world, frameTime: own }) => Array.from({ length: Math.round(((world.length - 1) * own) / frameTime) + 1 }, (_, frame) => world[Math.min(Math.round((frame * frameTime) / own), world.length - 1)]);
@@ -144,9 +161,12 @@ function dataOf(clips) {
   };
 }
 
-/** Begins the page again with these files. */
+let newest = 0;
+
+/** Begins the page again with these files, unless others were dropped since. */
 async function openFiles(files) {
   if (!files.length) return;
+  const own = ++newest;
   try {
     const readOne = async (file) => {
       try {
@@ -156,12 +176,17 @@ async function openFiles(files) {
       }
     };
     const clips = await Promise.all([...files].map(readOne));
+    if (own !== newest) return;
     const next = new DOMParser().parseFromString(page, "text/html");
     const title = clips.map(({ name }) => name).join(", ");
     for (const heading of next.querySelectorAll("title, h1")) heading.textContent = title;
     // As in page.rs: no "<" that could end the element.
     next.getElementById("motion-data").textContent = JSON.stringify(dataOf(clips)).replaceAll("<", "\\u003c");
-    history.replaceState(null, "", location.pathname);
+    // A link would lead to the page's own clips.
+    next.getElementById("link").hidden = true;
+    history.replaceState(null, "", `#theme=${root.dataset.theme}`);
+    play(false);
+    left = true;
     document.open();
     document.write(`<!doctype html>${next.documentElement.outerHTML}`);
     document.close();
@@ -175,7 +200,10 @@ async function openFiles(files) {
 function listenToFiles() {
   const chosen = document.getElementById("files");
   document.getElementById("open").addEventListener("click", () => chosen.click());
-  chosen.addEventListener("change", () => openFiles(chosen.files));
+  chosen.addEventListener("change", () => {
+    openFiles([...chosen.files]);
+    chosen.value = ""; // so that the same file can be chosen again
+  });
   addEventListener("dragover", (event) => event.preventDefault());
   addEventListener("drop", (event) => {
     event.preventDefault();

@@ -26,6 +26,7 @@ async function copy(text, button, otherwise) {
 
 /** The page at this frame. */
 function link() {
+  if (element("link").hidden) return;
   const asked = new URLSearchParams(location.hash.slice(1));
   asked.set("frame", Math.round(time.frame));
   if (look.arrangement === "overlay") asked.set("view", "overlay");

@@ -9,6 +9,7 @@ const look = { arrangement: "side", keyframes: true, paths: true, contacts: true
 const time = { frame: 0, playing: false, speed: 1, shownAt: 0, held: 0 };
 let perPixel = 1;
 let scheduled = false;
+let left = false; // another page has taken this one's place
 
 /** Draws once before the next repaint. */
 function refresh() {
@@ -20,6 +21,7 @@ function refresh() {
 
 function tick(now) {
   scheduled = false;
+  if (left) return;
   if (time.playing) {
     const heard = heardFrame();
     if (heard !== null && heard < LAST) time.frame = heard;

@@ -34,7 +34,8 @@ pub(super) fn synthesise(
     warnings.iter().map(ToString::to_string).for_each(warn);
     let (model, options) = (&*subject.model, asked.options);
     let sequence = synthesis::synthesise(model, &request, &options, &asked.name)?;
-    let document = keyframes.document(&sequence.clip, &sequence.keyframes);
+    let (clip, times) = (&sequence.clip, &sequence.keyframes);
+    let document = keyframes.document(clip, times, sequence.pinned_to.as_ref());
     let mut summary = Summary::new(&subject.what, &request, &sequence, &options, &warnings);
     if let Some((times, frame_time)) = keyframes.times_in_document(&sequence.keyframes) {
         summary = summary.at_frames(&times, frame_time);
