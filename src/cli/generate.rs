@@ -68,8 +68,8 @@ pub struct GenerateArgs {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Pin the feet where they stand on the floor, and lift them where they are below it: the floor
-    /// is as low as the feet come from the first keyframe of --motion to the last, or as they usually
-    /// are in the files of the keyframes
+    /// is as low as the feet come from the first keyframe of --motion to the last, or as they
+    /// usually are in the files of the keyframes
     #[arg(long)]
     foot_cleanup: bool,
     /// Show the motion beside interpolation and, where keyframes come from --motion at their own

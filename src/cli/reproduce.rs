@@ -66,8 +66,8 @@ pub struct ReproduceArgs {
     /// Train nothing: evaluate the runs that are finished and write the tables
     #[arg(long)]
     no_training: bool,
-    /// Print the tasks that the rows fall into, and end: number, core hours that are left to train as
-    /// busy as the machine is, rows; rows that share a training are one task
+    /// Print the tasks that the rows fall into, and end: number, core hours that are left to train
+    /// as busy as the machine is, rows; rows that share a training are one task
     #[arg(long, conflicts_with_all = ["task", "no_training"])]
     list: bool,
     /// Train and evaluate the rows of this task of --list alone, and write no tables

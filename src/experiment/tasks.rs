@@ -1,4 +1,5 @@
-//! The rows of a table in tasks that may run at the same time, on machines that share a file system.
+//! The rows of a table in tasks that may run at the same time, on machines that share a file
+//! system.
 
 use std::time::Duration;
 

@@ -31,8 +31,9 @@ impl Floor {
         }
     }
 
-    /// The floor of a dancer who mostly stands on it: the lowest ankle and the lowest toe of the frame
-    /// in the middle, by height; lower ones may have been measured wrong. As [`Floor::under`].
+    /// The floor of a dancer who mostly stands on it: the lowest ankle and the lowest toe of the
+    /// frame in the middle, by height; lower ones may have been measured wrong. As
+    /// [`Floor::under`].
     pub fn usual(world: &[Vec<DVec3>], feet: &Feet) -> Self {
         let middle = |joints: [usize; 2]| {
             let lowest = |frame: &Vec<DVec3>| frame[joints[0]].y.min(frame[joints[1]].y);

@@ -24,8 +24,9 @@ pub fn rest_directions(skeleton: &Skeleton) -> Vec<DVec3> {
     bones.map(direction).collect()
 }
 
-/// The joint whose bone points furthest from where it points on the other skeleton, and by how much,
-/// rad, where the two have not the same rest pose: rotations of one mean other poses on the other.
+/// The joint whose bone points furthest from where it points on the other skeleton, and by how
+/// much, rad, where the two have not the same rest pose: rotations of one mean other poses on the
+/// other.
 ///
 /// Both as [`rest_directions`] gives them, of the same joints.
 pub fn other_rest_pose(ours: &[DVec3], theirs: &[DVec3]) -> Option<(usize, f64)> {

@@ -4,9 +4,9 @@
 //! such frames it is held at one place; before and after, the correction comes and goes along a
 //! smooth curve. What is below the floor is lifted onto it, smoothly, too. The leg follows by
 //! two-bone inverse kinematics, and the foot turns to where its toe is held. A run over a keyframe
-//! holds the joint where the keyframe has it; one over several keyframes is split between them; near
-//! a keyframe outside the run the correction fades. So no keyframe changes. A joint that slides far
-//! in one contact is held at one place after another: it steps instead.
+//! holds the joint where the keyframe has it; one over several keyframes is split between them;
+//! near a keyframe outside the run the correction fades. So no keyframe changes. A joint that
+//! slides far in one contact is held at one place after another: it steps instead.
 
 use std::ops::Range;
 
@@ -29,8 +29,9 @@ const GAP: usize = 2;
 /// A joint that leaves its place by more than this within a contact slides or steps, cm: it is held
 /// at another place from then on.
 const HELD: f64 = 25.0;
-/// A toe is held less where that would bring it further than this from where the ankle takes it, cm,
-/// and not at all beyond the second: heel and toe that are held at odds would turn the foot about.
+/// A toe is held less where that would bring it further than this from where the ankle takes it,
+/// cm, and not at all beyond the second: heel and toe that are held at odds would turn the foot
+/// about.
 const AT_ODDS: [f64; 2] = [4.0, 12.0];
 
 /// Frames `from..to` in which a joint stands, and the keyframe among them whose place it keeps.
@@ -49,8 +50,9 @@ struct Hold {
     weight: Vec<f64>,
 }
 
-/// Pins the feet of `poses`, `[F]`, where they stand on a floor, and lifts them where they are below
-/// it; frames in `keyframes` (ascending) keep their poses. No keyframe's feet are below the floor.
+/// Pins the feet of `poses`, `[F]`, where they stand on a floor, and lifts them where they are
+/// below it; frames in `keyframes` (ascending) keep their poses. No keyframe's feet are below the
+/// floor.
 pub(super) fn pin_feet(
     skeleton: &Skeleton,
     poses: &mut [Pose],
@@ -129,8 +131,8 @@ fn on_floor(path: &[DVec3], floor: f64) -> Vec<bool> {
         .collect()
 }
 
-/// How far a joint is lifted so that it is nowhere below its floor, `[F]`, cm: over `ease` frames it
-/// comes and goes; at keyframes it is 0.
+/// How far a joint is lifted so that it is nowhere below its floor, `[F]`, cm: over `ease` frames
+/// it comes and goes; at keyframes it is 0.
 fn lift(path: &[DVec3], floor: f64, keyframes: &[usize], ease: usize) -> Vec<f64> {
     let lacking = path.iter().map(|place| (floor - place.y).max(0.0));
     let lacking: Vec<f64> = lacking.collect();
@@ -337,10 +339,10 @@ mod tests {
     fn a_stand_over_two_keyframes_is_split_between_them() {
         let found = stands(&on(&[(0, 100)], 100), &[0, 50, 54, 99]);
         let expected = [
-            stand(0, 19, Some(0)),
-            stand(31, 51, Some(50)),
-            stand(54, 70, Some(54)),
-            stand(82, 100, Some(99)),
+            stand(0, 25 - EASE, Some(0)),
+            stand(25 + EASE, 51, Some(50)),
+            stand(54, 76 - EASE, Some(54)),
+            stand(76 + EASE, 100, Some(99)),
         ];
         assert_eq!(found, expected);
     }
@@ -349,7 +351,7 @@ mod tests {
     fn a_joint_that_slides_far_is_held_at_one_place_after_another() {
         let path: Vec<DVec3> = (0..100).map(|x| DVec3::X * x as f64).collect();
         let found = steps(&stand(10, 90, Some(40)), &path);
-        let expected = [stand(15, 66, Some(40)), stand(72, 90, None)];
+        let expected = [stand(15, 66, Some(40)), stand(66 + EASE, 90, None)];
         assert_eq!(found, expected);
         let still = [DVec3::ONE; 100];
         assert_eq!(steps(&stand(10, 90, None), &still), [stand(10, 90, None)]);

@@ -430,8 +430,8 @@ impl Keyframes {
 
     /// A result, whose keyframes are at `times`, as a file's content: on the rig of the first
     /// keyframe's file, in its unit, axis and rate; or, from a file on the dance skeleton, with its
-    /// channels, or with Z X Y rotations where these cannot hold it. Feet that were pinned to a floor
-    /// are above it at that rate, too.
+    /// channels, or with Z X Y rotations where these cannot hold it. Feet that were pinned to a
+    /// floor are above it at that rate, too.
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
@@ -467,8 +467,8 @@ impl Keyframes {
     }
 
     /// The frames of a [document](Keyframes::document) that frames `times` of a result become, and
-    /// its seconds a frame, where these are others: the nearest of the rate of a rig's file, or those
-    /// that were asked for.
+    /// its seconds a frame, where these are others: the nearest of the rate of a rig's file, or
+    /// those that were asked for.
     pub fn times_in_document(&self, times: &[usize]) -> Option<(Vec<usize>, f64)> {
         let first = &self.sources[&self.keyframes.first()?.file];
         let ratio = 1.0 / (first.frame_time * self.data.fps);

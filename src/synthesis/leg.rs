@@ -7,8 +7,8 @@ use super::knee::Knee;
 use crate::motion::ik::two_bone;
 use crate::motion::{Pose, Skeleton};
 
-/// From this share of its length on a leg is stretched less than a place asks: before it is straight
-/// its knee snaps.
+/// From this share of its length on a leg is stretched less than a place asks: before it is
+/// straight its knee snaps.
 const SOFT: f64 = 0.97;
 /// A level foot turns upwards about the ankle by at most this before the ankle is lifted instead,
 /// rad; a steeper one by less, one that points straight down not at all.
@@ -77,8 +77,8 @@ impl Leg {
         pose.rotations[self.ankle] = (shin.inverse() * rotations[self.ankle]).normalize();
     }
 
-    /// How far the ankle must rise beyond `moved` so that its toe comes to `floor` by a small turn of
-    /// the foot, cm.
+    /// How far the ankle must rise beyond `moved` so that its toe comes to `floor` by a small turn
+    /// of the foot, cm.
     pub fn rise(&self, world: &[DVec3], moved: DVec3, floor: f64) -> f64 {
         let foot = world[self.toe] - world[self.ankle];
         let lacking = floor - world[self.toe].y - moved.y;
@@ -127,8 +127,8 @@ fn soft_reach(wanted: f64, now: f64, length: f64) -> f64 {
     eased.max(wanted.min(now))
 }
 
-/// A bone of the same length whose end is not below a height, both from its begin; straight up where
-/// it is too short for that.
+/// A bone of the same length whose end is not below a height, both from its begin; straight up
+/// where it is too short for that.
 fn not_below(bone: DVec3, height: f64) -> DVec3 {
     let length = bone.length();
     if bone.y >= height {

@@ -17,8 +17,8 @@ pub(super) struct OnWholeFrames {
 
 impl OnWholeFrames {
     /// A file's clip at `fps` frames a second with its frames `rows` (ascending) on whole ones.
-    /// With `own_times`, the rows are as many frames of the file apart as these say, and nothing of the
-    /// file is left but them and what is evenly between: poses made by hand.
+    /// With `own_times`, the rows are as many frames of the file apart as these say, and nothing of
+    /// the file is left but them and what is evenly between: poses made by hand.
     ///
     /// # Errors
     /// A row that the file does not have.

@@ -51,8 +51,8 @@ pub struct SequenceRequest {
     pub root_trajectory: Array2<f64>,
     /// Velocity factors wanted, `[F, 5]`, cm/frame.
     pub velocity_factors: Array2<f64>,
-    /// Where the keyframes stand; none on a skeleton without feet. Where they are those of a clip, as
-    /// low as its feet come between them, else as low as the feet usually are in their clips.
+    /// Where the keyframes stand; none on a skeleton without feet. Where they are those of a clip,
+    /// as low as its feet come between them, else as low as the feet usually are in their clips.
     pub floor: Option<Floor>,
 }
 

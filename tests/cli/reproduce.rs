@@ -424,8 +424,8 @@ fn tasks_in_processes_of_their_own_at_the_same_time_make_the_tables_of_one() {
     };
     let tasks = list(place.path());
     let rows: Vec<&str> = tasks.iter().map(|(_, _, rows)| rows.as_str()).collect();
-    assert_eq!(rows, ["interpolation", "whole_model", "one_lstm,refined"]);
-    assert_eq!(tasks[0].1, 0.0);
+    assert_eq!(rows, ["interpolation", "one_lstm,refined", "whole_model"]);
+    assert!(tasks[0].1 == 0.0 && tasks[1].1 >= 0.0);
     let running: Vec<_> = tasks
         .iter()
         .map(|(number, ..)| {

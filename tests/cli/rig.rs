@@ -425,7 +425,8 @@ fn pinned_feet_stay_above_the_floor_at_the_files_own_rate_and_on_its_rig() {
         "own.bvh",
         "--own-frames",
         "--keyframes",
-        "0,17,40,60",
+        "0,20,60",
+        "--raise=-30",
     ];
     let plain = danced(folder.path(), &options);
     fs::remove_file(folder.path().join("dance.bvh")).unwrap();

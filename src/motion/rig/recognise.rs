@@ -275,7 +275,8 @@ impl<'s> Body<'s> {
     }
 
     /// The head by its name, or else the end of the chain of joints called as the chest that goes
-    /// on from it; the neck is the first joint on the way to it that is called so, or else the first.
+    /// on from it; the neck is the first joint on the way to it that is called so, or else the
+    /// first.
     fn neck_and_head(&self, chest: usize) -> Option<(usize, usize)> {
         let hangs = |&joint: &usize| self.upwards(joint).skip(1).any(|above| above == chest);
         let mut heads = self.uppermost(None, &[Part::Head]).filter(hangs);

@@ -33,7 +33,7 @@ function parseBvh(text) {
     else if (word === "}") open.pop();
     else if (word === "OFFSET") joints[open.at(-1)].offset = [number(), number(), number()];
     else if (word === "CHANNELS") joints[open.at(-1)].channels = Array.from({ length: number() }, channel);
-    else throw new Error(`${word} is not understood`);
+    else throw new Error(`${words[at - 1]} is not understood`);
   }
   const value = (name) => {
     while (at < words.length && words[at].toUpperCase() !== name) at++;
@@ -88,15 +88,18 @@ function unitOf(joints) {
   return Object.entries({ m: 100, cm: 1, mm: 0.1, in: 2.54 }).reduce((best, unit) => (off(unit) < off(best) ? unit : best));
 }
 
-/** Whether Z points up: whether feet keep to one height along it more than along Y; where that does not tell, whether the head is above the root. */
-function isZUp(joints, world) {
+const FAR = 20; // deviation of the places of one who goes about, cm
+
+/** Whether Z points up: whether the feet of a dancer who goes about keep to one height along it, not along Y; of one who stays, whether the head is above the root. */
+function isZUp(joints, world, cm) {
   const spread = (axis) => {
-    const lowest = world.map((frame) => Math.min(...frame.map((place) => place[axis])));
+    const lowest = world.map((frame) => Math.min(...frame.filter((_, joint) => !joints[joint].isEnd).map((place) => place[axis])));
     const mean = lowest.reduce((sum, height) => sum + height, 0) / lowest.length;
     return Math.sqrt(lowest.reduce((sum, height) => sum + (height - mean) ** 2, 0) / lowest.length);
   };
   const [y, z] = [spread(1), spread(2)];
-  if (z < y / 2 || y < z / 2) return z < y;
+  const goes = cm * Math.max(y, z) > FAR;
+  if (goes && Math.min(y, z) < Math.max(y, z) / 4) return z < y;
   const head = joints.findIndex(({ name }) => /head/i.test(name));
   const above = (frame, axis) => {
     const top = head < 0 ? Math.max(...frame.map((place) => place[axis])) : frame[head][axis];
@@ -125,7 +128,7 @@ function read(name, text) {
   const file = parseBvh(text);
   const [unit, cm] = unitOf(file.joints);
   const world = worldOf(file);
-  const zUp = isZUp(file.joints, world);
+  const zUp = isZUp(file.joints, world, cm);
   const upright = ([x, y, z]) => (zUp ? [x, z, -y] : [x, y, z]).map((value) => value * cm);
   return { name, joints: file.joints, frameTime: file.frameTime, world: world.map((frame) => frame.map(upright)), about: `in ${unit}, ${zUp ? "Z" : "Y"} up` };
 }
