@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::reproduce::is_finished;
 use super::results::RowResults;
-use super::{ReproduceError, Reproduction, Row};
+use super::{ExperimentConfig, ReproduceError, Reproduction, Row};
 use crate::training::Trainer;
 
 impl<'a> Reproduction<'a> {
@@ -48,7 +48,12 @@ impl<'a> Reproduction<'a> {
                 continue;
             }
             counted.push(training);
-            let mut trainer = Trainer::new(row.config.clone(), self.dataset, self.threads)?;
+            // Drawn weights take as long as those that it begins with.
+            let config = ExperimentConfig {
+                start: None,
+                ..row.config.clone()
+            };
+            let mut trainer = Trainer::new(config, self.dataset, self.threads)?;
             sum += trainer.expected().unwrap_or_default();
         }
         Ok(sum)
