@@ -1,13 +1,12 @@
 //! Weights by name, blocks of their rows, and the gradients that a backward pass adds up.
 
 use std::ops::Range;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use ndarray::{ArrayD, ArrayViewMutD};
 
 use super::error::AutogradError;
-use super::kernels::{Mat, Packed, Real};
+use super::kernels::{Mat, Packed, Real, Repacked};
 
 /// A parameter of a [`Parameters`] and of its clones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -31,6 +30,13 @@ pub struct BufferId {
     owner: u32,
 }
 
+impl BufferId {
+    /// Its place among the buffers of the parameters.
+    pub fn place(self) -> usize {
+        self.index
+    }
+}
+
 #[derive(Debug, Clone)]
 struct Parameter<T> {
     name: String,
@@ -45,8 +51,8 @@ struct Block<T> {
     shape: Vec<usize>,
     /// The block as a right operand, W [out, in] and its transpose, packed when first used after an
     /// update.
-    packed: OnceLock<Packed<T>>,
-    packed_transposed: OnceLock<Packed<T>>,
+    packed: Repacked<T>,
+    packed_transposed: Repacked<T>,
 }
 
 /// Named weights, and named buffers: state that is saved with them and that no gradient moves, such
@@ -117,6 +123,14 @@ impl<T: Real> Parameters<T> {
         Ok(own.ok_or(foreign("buffer_mut"))?.value.view_mut())
     }
 
+    /// The buffer at a place among them.
+    pub fn buffer_at(&self, place: usize) -> Option<BufferId> {
+        (place < self.buffers.len()).then_some(BufferId {
+            index: place,
+            owner: self.owner,
+        })
+    }
+
     /// Names and values of the buffers, in the order in which they were added.
     pub fn buffers(&self) -> impl Iterator<Item = (&str, &ArrayD<T>)> {
         self.buffers
@@ -174,8 +188,8 @@ impl<T: Real> Parameters<T> {
             parameter: id.index,
             range,
             shape,
-            packed: OnceLock::new(),
-            packed_transposed: OnceLock::new(),
+            packed: Repacked::default(),
+            packed_transposed: Repacked::default(),
         });
         BlockId {
             index: self.blocks.len() - 1,
@@ -226,8 +240,8 @@ impl<T: Real> Parameters<T> {
 
     fn forget_packed(&mut self) {
         for block in &mut self.blocks {
-            block.packed.take();
-            block.packed_transposed.take();
+            block.packed.forget();
+            block.packed_transposed.forget();
         }
     }
 
@@ -253,16 +267,14 @@ impl<T: Real> Parameters<T> {
 
     /// The block W [out, in], packed as the right operand of `d y W`.
     pub(super) fn packed(&self, id: BlockId) -> &Packed<T> {
-        self.blocks[id.index]
-            .packed
-            .get_or_init(|| Packed::new(self.block_matrix(id)))
+        self.blocks[id.index].packed.get(|| self.block_matrix(id))
     }
 
     /// The transpose of the block W [out, in], packed as the right operand of `x W^T`.
     pub(super) fn packed_transposed(&self, id: BlockId) -> &Packed<T> {
         self.blocks[id.index]
             .packed_transposed
-            .get_or_init(|| Packed::transposed(self.block_matrix(id)))
+            .get_transposed(|| self.block_matrix(id))
     }
 }
 

@@ -32,7 +32,7 @@ mod tests;
 pub use dropout::{drop_in_place, dropout_into, dropped_into};
 pub use isa::{Isa, IsaError, vectorised};
 pub use matrix::{Mat, MatMut};
-pub use packed::Packed;
+pub use packed::{Packed, Repacked};
 pub use product::{product, product_at, product_bt, product_packed};
 pub use real::Real;
 pub use windows::{
