@@ -77,30 +77,31 @@ impl Lstm {
         Ok((output, state))
     }
 
-    /// All steps of sequences, `x [frames * batch, in]` frame by frame, from a state
-    /// `[batch, 2H]`: outputs `[frames * batch, H]` and the last state. What the inputs add to the
-    /// gates is one product for all frames.
+    /// All steps of sequences, `inputs [frames * batch, n_i]` side by side, frame by frame, from a
+    /// state `[batch, 2H]`: outputs `[frames * batch, H]` and the last state. What the inputs add
+    /// to the gates is one product for all frames.
     ///
     /// # Errors
     /// Rows that are no whole frames; an input of another width.
     pub fn sequence<T: Real>(
         &self,
         tape: &mut Tape<'_, T>,
-        x: Var,
+        inputs: &[Var],
         state: Var,
     ) -> Result<(Var, Var), AutogradError> {
+        let shape = inputs.first().map_or(&[][..], |&first| tape.shape(first));
         let batch = tape.shape(state).first().copied().unwrap_or(0);
-        let rows = tape.shape(x).first().copied().unwrap_or(0);
+        let rows = shape.first().copied().unwrap_or(0);
         if batch == 0 || !rows.is_multiple_of(batch) {
             return Err(AutogradError::Argument {
                 operation: "lstm",
-                shape: tape.shape(x).to_vec(),
+                shape: shape.to_vec(),
                 argument: format!("{batch} sequences"),
                 expected: "a row a frame and sequence",
             });
         }
         let (weight, bias) = (tape.block(self.weight_ih), tape.block(self.bias_ih));
-        let of_inputs = tape.linear(x, weight, Some(bias), false)?;
+        let of_inputs = tape.joined_linear(inputs, weight, bias)?;
         let (weight, bias) = (tape.block(self.weight_hh), tape.block(self.bias_hh));
         let mut state = state;
         let mut outputs = Vec::new();

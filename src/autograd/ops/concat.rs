@@ -40,9 +40,27 @@ impl<T: Real> Tape<'_, T> {
     /// No part, or parts that differ in an axis before the last.
     pub fn concat(&mut self, parts: &[Var]) -> Result<Var, AutogradError> {
         self.own("concat", parts)?;
+        let (shape, y) = self.join("concat", parts)?;
+        let total = shape.last().copied().unwrap_or(1);
+        let widths = parts
+            .iter()
+            .map(|&part| (part, self.rows_and_columns(part).1));
+        let parts_and_widths = widths.collect();
+        Ok(self.put("concat", parts, &shape, y, || Concat {
+            parts: parts_and_widths,
+            total,
+        }))
+    }
+
+    /// Shape and numbers of the parts beside each other, in a buffer of their own.
+    pub(super) fn join(
+        &mut self,
+        operation: &'static str,
+        parts: &[Var],
+    ) -> Result<(Vec<usize>, Vec<T>), AutogradError> {
         let Some(&first) = parts.first() else {
             let expected = "at least one part";
-            return Err(argument_error("concat", &[], "no parts".into(), expected));
+            return Err(argument_error(operation, &[], "no parts".into(), expected));
         };
         let mut shape = self.shape(first).to_vec();
         let lead = shape.len().saturating_sub(1);
@@ -50,7 +68,7 @@ impl<T: Real> Tape<'_, T> {
             let other = self.shape(part);
             if other.is_empty() || other.len() != shape.len() || other[..lead] != shape[..lead] {
                 let expected = "equal axes before the last";
-                return Err(shapes_error("concat", &shape, other, expected));
+                return Err(shapes_error(operation, &shape, other, expected));
             }
         }
         let widths: Vec<(Var, usize)> = parts
@@ -71,10 +89,7 @@ impl<T: Real> Tape<'_, T> {
             start += width;
         }
         shape[lead] = total;
-        Ok(self.put("concat", parts, &shape, y, || Concat {
-            parts: widths,
-            total,
-        }))
+        Ok((shape, y))
     }
 }
 

@@ -24,6 +24,7 @@ mod dropout;
 mod exp;
 mod forward_kinematics;
 mod gelu;
+mod joined_linear;
 mod layer_norm;
 mod linear;
 mod ln;
@@ -123,6 +124,7 @@ mod gradient_is_that_of_central_differences {
         exp,
         forward_kinematics,
         gelu,
+        joined_linear,
         layer_norm,
         linear,
         ln,

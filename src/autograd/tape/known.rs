@@ -1,5 +1,7 @@
 //! The values on a tape as an operation reads them, on its way forth and back.
 
+use std::ops::Range;
+
 use ndarray::{ArrayViewD, IxDyn};
 
 use super::{Node, Value, Var};
@@ -62,6 +64,18 @@ impl<'s, T: Real> Known<'s, T> {
             Value::Block(id) => product_packed(x, self.parameters.packed(id), out, accumulate),
             _ => product(x, self.matrix(weight), out, accumulate),
         }
+    }
+
+    /// out (+)= x W for some columns of a weight W `[out, in]`.
+    pub(in crate::autograd) fn product_of_columns(
+        self,
+        x: Mat<'_, T>,
+        weight: Var,
+        columns: Range<usize>,
+        out: MatMut<'_, T>,
+        accumulate: bool,
+    ) {
+        product(x, self.matrix(weight).columns(columns), out, accumulate);
     }
 
     /// out (+)= x W^T for a weight W `[out, ..]`, packed where it is a parameter.

@@ -89,14 +89,14 @@ impl LstmCoupling {
         condition: Var,
         states: &[Var],
     ) -> Result<(Var, Var, Vec<Var>), AutogradError> {
-        let mut x = tape.concat(&[a, condition])?;
+        let mut x = vec![a, condition];
         let mut after = Vec::new();
         for (layer, &state) in self.layers.iter().zip(states) {
-            let (outputs, state) = layer.sequence(tape, x, state)?;
-            x = outputs;
+            let (outputs, state) = layer.sequence(tape, &x, state)?;
+            x = vec![outputs];
             after.push(state);
         }
-        let said = self.output.forward(tape, x)?;
+        let said = self.output.forward(tape, x[0])?;
         let (rows, changed) = (tape.shape(said)[0], self.channels.div_ceil(2));
         let pairs = tape.reshape(said, &[rows * changed, 2])?;
         let mut of_pair = |k: usize| {
