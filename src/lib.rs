@@ -36,6 +36,7 @@
 //! - [`nn`] - layers of weights, built on the tape's operations.
 //! - [`optim`] - Adam, groups of learning rates, schedules.
 //! - [`models`] - a folder a paper, behind two traits: [`models::Task`] and [`models::Generator`].
+//! - [`ranks`] - processes that train one model together.
 //! - [`training`] - the loop over a task's steps; it names no paper.
 //! - [`run`] - a run's folder: checkpoints, manifest, log, lock.
 //! - [`experiment`] - configs in layers, rows, whole tables reproduced.
@@ -64,6 +65,7 @@ pub mod motion;
 pub mod music;
 pub mod nn;
 pub mod optim;
+pub mod ranks;
 pub mod report;
 pub mod run;
 #[cfg(feature = "papers")]

@@ -32,6 +32,7 @@ def keydance(arguments, sizes, frames, batch):
     for key, value in sizes.items():
         command += ["--set", f"model.{key}={value}"]
     command += ["--frames", str(frames), "--batch", str(batch), "--threads", threads]
+    command += ["--shards", threads]
     command += ["--repetitions", str(STEPS), "--json"]
     process = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     if process.returncode != 0:

@@ -7,9 +7,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::notice::out;
 use crate::experiment::ExperimentConfig;
 use crate::models::transition::measure::GenerationSpeed;
 use crate::nn::measure::LayersSpeed;
+use crate::ranks;
 use crate::training::measure::step_speed;
 
 /// What is timed.
@@ -85,7 +87,7 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
     let (threads, repetitions) = (args.threads.into(), args.repetitions.into());
     print(
         args.json,
-        &step_speed(&config, frames, batch, threads, repetitions)?,
+        &step_speed(&config, frames, batch, threads, repetitions, ranks::join()?)?,
     )
 }
 
@@ -114,5 +116,5 @@ fn print(json: bool, speed: &(impl Serialize + Display)) -> anyhow::Result<()> {
         true => serde_json::to_string(speed)?,
         false => speed.to_string(),
     };
-    Ok(writeln!(std::io::stdout(), "{line}")?)
+    Ok(writeln!(out(), "{line}")?)
 }

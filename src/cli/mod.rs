@@ -38,6 +38,7 @@ use clap::{Parser, Subcommand};
 
 use self::notice::notice;
 use crate::autograd::kernels::Isa;
+use crate::ranks;
 use crate::run::manifest::Build;
 use crate::training::TrainingError;
 
@@ -131,6 +132,14 @@ impl Cli {
     /// Whatever the subcommand could not do.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         Isa::asked_for()?;
+        if let Some((_, count)) = ranks::launched().filter(|&(_, count)| count > 1)
+            && !matches!(self.command, Command::Train(_) | Command::BenchStep(_))
+        {
+            anyhow::bail!(
+                "{count} ranks of an MPI launcher: train and bench-step alone share their work \
+                 among ranks; reproduce deals out rows by --task"
+            );
+        }
         match self.command {
             Command::Train(args) => return train::run(args),
             Command::Evaluate(args) => return evaluate::run(args),

@@ -88,6 +88,8 @@ pub struct Progress {
     /// What its lines begin with.
     name: String,
     steps: u64,
+    /// What was warned of.
+    warned: Vec<&'static str>,
 }
 
 impl Progress {
@@ -98,11 +100,21 @@ impl Progress {
             meter: Meter::new(task.frame_steps(), before, name.is_empty()),
             name,
             steps: task.steps(),
+            warned: Vec::new(),
         }
     }
 
-    /// Shows a step that is done.
+    /// Shows a step that is done, and warns once of what has left its bounds.
     pub fn step(&mut self, report: &StepReport) {
+        for alarm in report.alarms() {
+            if !self.warned.contains(&alarm.name) {
+                self.warned.push(alarm.name);
+                notice(format_args!(
+                    "warning: {}step {}: {} is {:.1}, below {}: {}",
+                    self.name, report.step, alarm.name, alarm.least, alarm.bound, alarm.advice
+                ));
+            }
+        }
         let (rate, left) = self.meter.speed(report.frame_steps);
         let length = report
             .column("length")

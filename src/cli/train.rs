@@ -2,20 +2,22 @@
 
 use std::io::{self, Write as _};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
 use indicatif::HumanDuration;
 
-use super::notice::warn;
+use super::notice::{out, warn};
 use super::progress::Progress;
 use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::experiment::{Curves, ExperimentConfig};
 use crate::models::weights::SavedWeights;
+use crate::ranks::{self, Together};
 use crate::run::RunFolder;
 use crate::training::{Outcome, Resumed, Trainer};
 
@@ -47,46 +49,68 @@ pub struct TrainArgs {
     threads: Threads,
 }
 
-/// # Errors
-/// The config, the data or the run's folder cannot be used; the training diverged.
-pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
-    let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
-    let mut out = io::stdout();
-    let dataset = Dataset::load(&args.data, &config.data)?;
-    warn(&dataset.warnings);
-    let given = args.start.as_ref();
-    let given = given.map(|run| RunFolder::open(run).newest_weights());
-    let given = given.transpose()?;
-    let start = match &given {
-        Some(path) => Some(SavedWeights::read(path)?),
-        None => RunFolder::open(&args.out).start()?,
-    };
-    let threads = args.threads.count();
-    let mut trainer = Trainer::from_weights(config.clone(), &dataset, threads, start.as_ref())?;
-    let (run, resumed) = if args.resume {
-        let run = RunFolder::resume(&args.out, &config)?;
-        let resumed = trainer.resume(&run)?;
-        (run, Some(resumed))
-    } else {
-        (RunFolder::create(&args.out, &config)?, None)
-    };
-    if let Some(weights) = &given {
-        run.keep_start(weights)?;
+/// What a training is made of, read from files.
+struct Loaded {
+    config: ExperimentConfig,
+    dataset: Dataset,
+    /// The weights that it starts from, and those of another run where they are given.
+    start: Option<SavedWeights>,
+    given: Option<PathBuf>,
+}
+
+impl Loaded {
+    fn read(args: &TrainArgs) -> anyhow::Result<Self> {
+        let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
+        let dataset = Dataset::load(&args.data, &config.data)?;
+        warn(&dataset.warnings);
+        let given = args.start.as_ref();
+        let given = given.map(|run| RunFolder::open(run).newest_weights());
+        let given = given.transpose()?;
+        let start = match &given {
+            Some(path) => Some(SavedWeights::read(path)?),
+            None => RunFolder::open(&args.out).start()?,
+        };
+        Ok(Self {
+            config,
+            dataset,
+            start,
+            given,
+        })
     }
+}
+
+/// # Errors
+/// The config, the data or the run's folder cannot be used; the training diverged; another rank
+/// cannot go on.
+pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
+    let ranks = ranks::join()?;
+    let mut together = Together::new(Arc::clone(&ranks));
+    let loaded = together.agree(Loaded::read(&args))?;
+    let threads = args.threads.count();
+    let (config, dataset) = (loaded.config, &loaded.dataset);
+    let trainer = Trainer::from_weights(config.clone(), dataset, threads, loaded.start.as_ref());
+    let mut trainer = together.agree(trainer)?;
+    let taken = together
+        .is_first()
+        .then(|| take_up(&args, loaded.given.as_deref(), &mut trainer));
+    let taken = together.agree(taken.transpose())?;
+    let (run, resumed) = taken.unzip();
+    trainer.join(ranks)?;
+    let mut out = out();
     describe(&trainer)?;
     if let Some(expected) = trainer.expected() {
         let expected = HumanDuration(expected.max(Duration::from_secs(1)));
         writeln!(out, "takes about {expected}, as busy as the machine is now")?;
     }
     writeln!(out, "\n{}", config.to_toml()?)?;
-    match resumed {
+    match resumed.flatten() {
         Some(Resumed { steps: 0, .. }) => writeln!(out, "no checkpoint yet: begins")?,
         Some(resumed) => goes_on(&resumed)?,
         None => {}
     }
     let mut progress = Progress::new(String::new(), trainer.task(), trainer.frame_steps_done());
     let stop = Stop::on_signal(String::new())?;
-    let outcome = trainer.run(Some(&run), &mut |report| {
+    let outcome = trainer.run(run.as_ref(), &mut |report| {
         progress.step(report);
         match stop.is_asked() {
             true => ControlFlow::Break(()),
@@ -94,14 +118,16 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         }
     });
     drop(progress);
-    match outcome? {
-        Outcome::Finished => {
+    let finished = outcome? == Outcome::Finished;
+    match run {
+        Some(run) if finished => {
             Curves::write_into_run(&run, &config)?;
             writeln!(out, "{}", run.weights().display())?;
             writeln!(out, "weights {}", trainer.weights_digest())?;
             Ok(ExitCode::SUCCESS)
         }
-        Outcome::Stopped => {
+        _ if finished => Ok(ExitCode::SUCCESS),
+        _ => {
             let (done, all) = (trainer.steps_done(), trainer.task().steps());
             let resume = if args.resume { "" } else { " --resume" };
             Ok(interrupted(format_args!(
@@ -112,13 +138,33 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
+/// The run's folder, and where the training goes on if it does.
+fn take_up(
+    args: &TrainArgs,
+    start: Option<&Path>,
+    trainer: &mut Trainer<'_>,
+) -> anyhow::Result<(RunFolder, Option<Resumed>)> {
+    let (run, resumed) = match args.resume {
+        true => {
+            let run = RunFolder::resume(&args.out, trainer.config())?;
+            let resumed = trainer.resume(&run)?;
+            (run, Some(resumed))
+        }
+        false => (RunFolder::create(&args.out, trainer.config())?, None),
+    };
+    if let Some(weights) = start {
+        run.keep_start(weights)?;
+    }
+    Ok((run, resumed))
+}
+
 /// Says how large the training is, and what of it cannot be trained.
 ///
 /// # Errors
 /// The output cannot be written.
 pub fn describe(trainer: &Trainer<'_>) -> io::Result<()> {
-    writeln!(io::stdout(), "{}", trainer.summary())?;
-    warn(trainer.task().warnings());
+    writeln!(out(), "{}", trainer.summary())?;
+    warn(trainer.warnings());
     Ok(())
 }
 
@@ -131,6 +177,6 @@ pub fn goes_on(resumed: &Resumed) -> io::Result<()> {
     warn(resumed.warnings());
     match resumed.steps {
         0 => Ok(()),
-        steps => writeln!(io::stdout(), "goes on after step {steps}"),
+        steps => writeln!(out(), "goes on after step {steps}"),
     }
 }

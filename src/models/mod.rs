@@ -51,4 +51,4 @@ pub use generator::{Generator, ModelError, Motion, Request};
 pub use settings::{ModelKind, ModelSettings, Paper, TaskSetting};
 pub use statistics::Statistics;
 pub use streams::Streams;
-pub use task::{CRITICS, LossTerms, Step, Task};
+pub use task::{CRITICS, LossTerms, Meeting, Step, Task, Watched};

@@ -73,6 +73,12 @@ pub trait Step<T: Real>: Send + Sync {
     /// Operands that an operation refuses.
     fn losses(&self, tape: &mut Tape<'_, T>, shard: usize) -> Result<LossTerms, AutogradError>;
 
+    /// What its shards do instead where its losses are not theirs alone, such as where a norm's
+    /// statistics are those of the whole batch. With one shard [`Step::losses`] counts.
+    fn meeting(&self) -> Option<&dyn Meeting<T>> {
+        None
+    }
+
     /// The task's own columns of the log, in a fixed order.
     fn columns(&self) -> Vec<(&'static str, Value)> {
         Vec::new()
@@ -80,6 +86,21 @@ pub trait Step<T: Real>: Send + Sync {
 
     /// What it is in an error, such as "16 windows of 30 frames".
     fn describe(&self) -> String;
+}
+
+/// A step whose shards compute by themselves up to a place, where they meet.
+pub trait Meeting<T: Real>: Send + Sync {
+    /// What a shard brings there, `[rows, ..]`.
+    ///
+    /// # Errors
+    /// Operands that an operation refuses.
+    fn bring(&self, tape: &mut Tape<'_, T>, shard: usize) -> Result<Var, AutogradError>;
+
+    /// The step's losses by what all shards bring, their rows in the shards' order.
+    ///
+    /// # Errors
+    /// Operands that an operation refuses.
+    fn losses(&self, tape: &mut Tape<'_, T>, together: Var) -> Result<LossTerms, AutogradError>;
 }
 
 /// Loss terms of a step or of a shard of it, each `[1]`.
@@ -96,6 +117,19 @@ pub struct LossTerms {
     /// New values of buffers, such as running means, each with as many numbers as the buffer. They
     /// are taken up after the step: where several shards give one buffer's, their mean.
     pub buffers: Vec<(BufferId, Vec<f64>)>,
+    /// What to keep an eye on, in a fixed order.
+    pub watched: Vec<Watched>,
+}
+
+/// A number that says whether a training still goes well: where there are several, the least.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Watched {
+    pub name: &'static str,
+    pub least: f64,
+    /// Below this it does not.
+    pub bound: f64,
+    /// What is wrong then, and what to do.
+    pub advice: &'static str,
 }
 
 impl LossTerms {
@@ -118,6 +152,7 @@ impl LossTerms {
             critics,
             terms: terms.iter().map(|&(name, _, term)| (name, term)).collect(),
             buffers: Vec::new(),
+            watched: Vec::new(),
         })
     }
 }

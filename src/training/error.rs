@@ -5,6 +5,7 @@ use thiserror::Error;
 use crate::data::EmptyPart;
 use crate::models::ModelError;
 use crate::optim::SettingError;
+use crate::ranks::RanksError;
 use crate::run::{FileError, RunError};
 
 /// Why a training cannot begin, go on or be saved.
@@ -14,6 +15,8 @@ pub enum TrainingError {
     Run(#[from] RunError),
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[error(transparent)]
+    Ranks(#[from] RanksError),
     /// What is asked for cannot be trained: what, and what to do.
     #[error("{0}")]
     Refused(String),

@@ -1,6 +1,7 @@
 //! How fast a training step is: the very step that a training runs, on made-up windows.
 
 use std::fmt;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -14,6 +15,7 @@ use crate::models::{Streams, Task};
 use crate::nn::Initialiser;
 use crate::nn::measure::fastest;
 use crate::optim::Adam;
+use crate::ranks::{Ranks, Together, Traffic};
 
 /// A training step that can be timed again and again: forward, losses, backward and Adam.
 pub struct MeasuredStep {
@@ -53,6 +55,18 @@ impl MeasuredStep {
         })
     }
 
+    /// The same with the work shared among ranks.
+    #[must_use]
+    pub fn on(mut self, ranks: Arc<dyn Ranks>) -> Self {
+        self.stepper.together = Together::new(ranks);
+        self
+    }
+
+    /// What was sent to other ranks so far, and how long they were waited for.
+    pub fn traffic(&self) -> Traffic {
+        self.stepper.together.traffic()
+    }
+
     /// Parts that a step is computed in.
     pub fn shards(&self) -> usize {
         self.task.step(0).shards()
@@ -87,6 +101,11 @@ pub struct StepSpeed {
     pub batch: usize,
     pub shards: usize,
     pub threads: usize,
+    /// Processes that share the shards, each with as many threads.
+    pub ranks: usize,
+    /// What this one sent in a step, bytes, and how long it waited for others, s; means.
+    pub bytes_sent: f64,
+    pub seconds_waiting: f64,
     /// The fastest of the timed steps, s.
     pub seconds: f64,
     /// Frames predicted in forward, backward and update a second, at that.
@@ -97,17 +116,25 @@ impl fmt::Display for StepSpeed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "training step, {} of {}, {}: {:.3} s, {:.0} frame-steps/s",
+            "training step, {} of {}, {}",
             counted(self.batch, "window"),
             counted(self.frames, "frame"),
-            counted(self.threads, "thread"),
-            self.seconds,
-            self.frame_steps_per_second
-        )
+            counted(self.threads, "thread")
+        )?;
+        if self.ranks > 1 {
+            write!(f, " on each of {} ranks", self.ranks)?;
+        }
+        let (seconds, rate) = (self.seconds, self.frame_steps_per_second);
+        write!(f, ": {seconds:.3} s, {rate:.0} frame-steps/s")?;
+        if self.ranks > 1 {
+            let (sent, waiting) = (self.bytes_sent / 1e6, self.seconds_waiting);
+            write!(f, "; rank 0 sends {sent:.1} MB and waits {waiting:.3} s")?;
+        }
+        Ok(())
     }
 }
 
-/// Times `repetitions` steps after one to warm up.
+/// Times `repetitions` steps after one to warm up, on these ranks.
 ///
 /// # Errors
 /// As [`MeasuredStep::new`] and [`MeasuredStep::run`].
@@ -117,14 +144,20 @@ pub fn step_speed(
     batch: usize,
     threads: usize,
     repetitions: usize,
+    ranks: Arc<dyn Ranks>,
 ) -> Result<StepSpeed, TrainingError> {
-    let mut step = MeasuredStep::new(config, frames, batch, threads)?;
+    let count = ranks.count();
+    let mut step = MeasuredStep::new(config, frames, batch, threads)?.on(ranks);
     let seconds = fastest(repetitions, || step.run())?;
+    let (traffic, steps) = (step.traffic(), step.done as f64);
     Ok(StepSpeed {
         frames,
         batch,
         shards: step.shards(),
         threads,
+        ranks: count,
+        bytes_sent: traffic.bytes_sent as f64 / steps,
+        seconds_waiting: traffic.seconds / steps,
         seconds,
         frame_steps_per_second: (frames * batch) as f64 / seconds,
     })

@@ -7,7 +7,9 @@
 
 mod best;
 mod error;
+mod losses;
 pub mod measure;
+mod meeting;
 mod record;
 mod report;
 mod resume;

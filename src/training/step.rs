@@ -1,15 +1,19 @@
 //! One step: its shards run forwards and backwards, Adam moves the weights.
 
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::error::TrainingError;
+use super::losses::Losses;
+use super::meeting::{Place, run_meeting};
 use crate::autograd::{AutogradError, BufferId, Gradients, Parameters, Tape, Workspace};
 use crate::counted::counted;
-use crate::models::{Step, Streams};
+use crate::models::{Meeting, Step, Streams};
 use crate::optim::{Adam, AdamError};
+use crate::ranks::Together;
 
 /// What a step is given.
 #[derive(Clone, Copy)]
@@ -20,14 +24,22 @@ pub struct StepInput<'s> {
     pub done: u64,
 }
 
-/// Losses of a step or of a shard of it.
-#[derive(Debug, Default)]
-pub struct Losses {
-    pub total: f64,
-    /// By name, not weighted.
-    pub terms: Vec<(&'static str, f64)>,
-    /// New values of buffers.
-    buffers: Vec<(BufferId, Vec<f64>)>,
+impl<'t> StepInput<'_> {
+    /// A tape for one of the step's parts.
+    pub(super) fn tape(
+        &self,
+        parameters: &'t Parameters<f32>,
+        workspace: &'t mut Workspace<f32>,
+        part: usize,
+        trace: bool,
+    ) -> Tape<'t, f32> {
+        let key = self.streams.dropout(self.done, part);
+        let tape = Tape::recording(parameters, workspace).with_dropout(key);
+        match trace {
+            true => tape.with_trace(),
+            false => tape,
+        }
+    }
 }
 
 /// Threads for rayon.
@@ -48,8 +60,9 @@ pub fn pool(threads: usize) -> Result<ThreadPool, TrainingError> {
 pub struct Stepper {
     pool: ThreadPool,
     workspaces: Mutex<Vec<Workspace<f32>>>,
-    /// One for each shard that a step has had, zero between steps.
+    /// One for each shard that a step has had on this rank, zero between steps.
     gradients: Vec<Gradients<f32>>,
+    pub together: Together,
 }
 
 impl Stepper {
@@ -60,6 +73,7 @@ impl Stepper {
             pool: pool(threads)?,
             workspaces: Mutex::new(Vec::new()),
             gradients: Vec::new(),
+            together: Together::default(),
         })
     }
 
@@ -87,6 +101,49 @@ impl Stepper {
         result
     }
 
+    /// Losses of this rank's shards; their gradients are added to `self.gradients`.
+    fn own_losses(
+        &mut self,
+        input: StepInput<'_>,
+        parameters: &Parameters<f32>,
+        own: Range<usize>,
+    ) -> Result<Vec<Losses>, TrainingError> {
+        let gradients = &mut self.gradients[..own.len()];
+        let (workspaces, pool) = (&self.workspaces, &self.pool);
+        let free = || workspaces.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(meeting) = meeting_of(input.step) {
+            let mut taken = std::mem::take(&mut *free());
+            taken.resize_with(taken.len().max(own.len() + 1), Workspace::new);
+            let place = Place {
+                workspaces: &mut taken[..=own.len()],
+                gradients,
+                together: &mut self.together,
+                shards: own,
+            };
+            let losses = pool.install(|| run_meeting(input, meeting, parameters, place, false));
+            free().append(&mut taken);
+            return losses;
+        }
+        let losses: Vec<Result<Losses, AutogradError>> = pool.install(|| {
+            gradients
+                .par_iter_mut()
+                .zip(own)
+                .map(|(gradients, shard)| {
+                    let taken = free().pop();
+                    let mut workspace = taken.unwrap_or_default();
+                    let losses =
+                        run_shard(input, parameters, &mut workspace, shard, gradients, false);
+                    free().push(workspace);
+                    losses
+                })
+                .collect()
+        });
+        let losses = losses.into_iter();
+        losses
+            .map(|losses| losses.map_err(|cause| failure(input, cause)))
+            .collect()
+    }
+
     fn try_step(
         &mut self,
         input: StepInput<'_>,
@@ -94,36 +151,18 @@ impl Stepper {
         adam: &mut Adam<f32>,
     ) -> Result<(Losses, f64), TrainingError> {
         let shards = input.step.shards();
-        while self.gradients.len() < shards {
+        let own = self.together.own_shards(shards);
+        // A rank without a shard takes part in the sum.
+        let count = own.len().max(1);
+        while self.gradients.len() < count {
             self.gradients.push(Gradients::zeros(parameters));
         }
-        let gradients = &mut self.gradients[..shards];
-        let (workspaces, before, pool) = (&self.workspaces, &*parameters, &self.pool);
-        let free = || workspaces.lock().unwrap_or_else(PoisonError::into_inner);
-        let losses: Vec<Result<Losses, AutogradError>> = pool.install(|| {
-            gradients
-                .par_iter_mut()
-                .enumerate()
-                .map(|(shard, gradients)| {
-                    let taken = free().pop();
-                    let mut workspace = taken.unwrap_or_default();
-                    let losses = run_shard(input, before, &mut workspace, shard, gradients, false);
-                    free().push(workspace);
-                    losses
-                })
-                .collect()
-        });
-        let mut sum = Losses::default();
-        for losses in losses {
-            let losses = losses.map_err(|cause| failure(input, cause))?;
-            sum.total += losses.total;
-            for ((_, sum), (_, term)) in sum.terms.iter_mut().zip(&losses.terms) {
-                *sum += term;
-            }
-            if sum.terms.is_empty() {
-                sum.terms = losses.terms;
-            }
-            sum.buffers.extend(losses.buffers);
+        let losses = self.own_losses(input, parameters, own);
+        let sum = Losses::of_all(losses, parameters, &mut self.together)?;
+        let (pool, mut gradients) = (&self.pool, &mut self.gradients[..count]);
+        if !self.together.is_alone() {
+            self.together.sum(shards, gradients);
+            gradients = &mut gradients[..1];
         }
         let norm = pool.install(|| adam.step_shards(parameters, gradients));
         match norm {
@@ -141,7 +180,7 @@ impl Stepper {
                 Err(refused(input, &error))
             }
             Err(error) => {
-                let cause = trace(input, parameters, gradients).map(|cause| cause.to_string());
+                let cause = trace(input, parameters, gradients);
                 Err(non_finite(input, cause.unwrap_or(error.to_string())))
             }
         }
@@ -153,14 +192,36 @@ fn trace(
     input: StepInput<'_>,
     parameters: &Parameters<f32>,
     gradients: &mut [Gradients<f32>],
-) -> Option<AutogradError> {
+) -> Option<String> {
     let mut workspace = Workspace::new();
+    let shards = input.step.shards();
+    if let Some(meeting) = meeting_of(input.step) {
+        let mut gradients = vec![Gradients::zeros(parameters); shards];
+        let mut workspaces = Vec::new();
+        workspaces.resize_with(shards + 1, Workspace::new);
+        let place = Place {
+            workspaces: &mut workspaces,
+            gradients: &mut gradients,
+            together: &mut Together::default(),
+            shards: 0..shards,
+        };
+        let ended = run_meeting(input, meeting, parameters, place, true).err();
+        return ended.map(|error| match error {
+            TrainingError::NonFinite { cause, .. } => cause,
+            error => error.to_string(),
+        });
+    }
     // One sum for all shards: each may be finite where their sum is not.
     let sum = gradients.first_mut()?;
     sum.set_zero();
-    (0..input.step.shards())
+    (0..shards)
         .map(|shard| run_shard(input, parameters, &mut workspace, shard, sum, true))
-        .find_map(Result::err)
+        .find_map(|losses| losses.err().map(|cause| cause.to_string()))
+}
+
+/// Where the step's shards meet, if it has several that do.
+fn meeting_of(step: &dyn Step<f32>) -> Option<&dyn Meeting<f32>> {
+    step.meeting().filter(|_| step.shards() > 1)
 }
 
 /// Each buffer becomes the mean of the values that shards give for it, in the order of the shards.
@@ -203,27 +264,17 @@ fn run_shard(
     gradients: &mut Gradients<f32>,
     trace: bool,
 ) -> Result<Losses, AutogradError> {
-    let mut tape = Tape::recording(parameters, workspace)
-        .with_dropout(input.streams.dropout(input.done, shard));
-    if trace {
-        tape = tape.with_trace();
-    }
+    let mut tape = input.tape(parameters, workspace, shard, trace);
     let losses = input.step.losses(&mut tape, shard)?;
-    let number = |var| tape.values(var).iter().map(|&x| f64::from(x)).sum::<f64>();
-    let terms = losses.terms.iter();
-    let values = Losses {
-        total: number(losses.total),
-        terms: terms.map(|&(name, var)| (name, number(var))).collect(),
-        buffers: losses.buffers,
-    };
-    if !values.total.is_finite() || values.terms.iter().any(|(_, x)| !x.is_finite()) {
+    let values = Losses::read(&tape, &losses);
+    if !values.are_finite() {
         tape.check_finite()?;
     }
     tape.backward(losses.total, gradients)?;
     Ok(values)
 }
 
-fn failure(input: StepInput<'_>, cause: AutogradError) -> TrainingError {
+pub(super) fn failure(input: StepInput<'_>, cause: AutogradError) -> TrainingError {
     match cause {
         AutogradError::NonFinite { .. } => non_finite(input, cause.to_string()),
         cause => refused(input, &cause),

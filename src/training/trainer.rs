@@ -1,6 +1,7 @@
 //! The loop: from a config and a data set to trained weights.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::best::Best;
@@ -11,13 +12,15 @@ use super::step::{StepInput, Stepper};
 use super::validation::Validation;
 use crate::autograd::Parameters;
 use crate::counted::counted;
-use crate::data::Dataset;
+use crate::data::{Dataset, file_digest};
 use crate::experiment::ExperimentConfig;
 use crate::models::settings::{InitialRng, TaskSetting};
 use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Streams, Task, weights};
 use crate::nn::Initialiser;
 use crate::optim::Adam;
+use crate::ranks::{Identity, Ranks, Together, Traffic};
+use crate::run::manifest::{self, Build};
 use crate::run::{RunError, RunFolder, RunState};
 
 /// A training: weights, optimiser and place in the schedule.
@@ -179,6 +182,25 @@ impl<'d> Trainer<'d> {
         )
     }
 
+    /// What a person should know before it begins: of the task, and threads that have nothing to
+    /// do.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.task.warnings();
+        let (shards, ranks) = (self.task.step(0).shards(), self.stepper.together.count());
+        let idle = (self.threads * ranks).saturating_sub(shards);
+        if idle > 0 {
+            warnings.push(format!(
+                "{} to do: a step has {} (schedule.shards), and a thread computes one at a time",
+                match idle {
+                    1 => "1 thread has nothing".into(),
+                    idle => format!("{idle} threads have nothing"),
+                },
+                counted(shards, "shard")
+            ));
+        }
+        warnings
+    }
+
     /// Steps done.
     pub fn steps_done(&self) -> u64 {
         self.adam.steps()
@@ -210,6 +232,43 @@ impl<'d> Trainer<'d> {
             .generator(&self.config.name, self.parameters.clone())
     }
 
+    /// Goes on together with other ranks, from where the first stands; it alone keeps a run's
+    /// folder and scores the validation clips. The end has the bits of one process.
+    ///
+    /// # Errors
+    /// Another rank has another program, config or data; then on every rank.
+    pub fn join(&mut self, ranks: Arc<dyn Ranks>) -> Result<(), TrainingError> {
+        let together = &mut self.stepper.together;
+        *together = Together::new(ranks);
+        let own = [
+            ("program", Build::this().to_string()),
+            ("instruction set", manifest::instructions()),
+            ("config", file_digest(self.config_toml.as_bytes())),
+            ("data", self.dataset.digest.clone()),
+        ];
+        let own = own.map(|(name, value)| (name.to_owned(), value));
+        Identity::agree(&together.share(Identity(own.to_vec()))?)?;
+        let place = together.share((self.adam.steps(), self.frame_steps))?;
+        let (steps, frame_steps) = place[0];
+        let saved = self.parameters.saved_mut().map(|(_, values)| values);
+        let mut moments = self.adam.moments().map(<[_]>::to_vec);
+        for mut values in saved {
+            if let Some(values) = values.as_slice_mut() {
+                together.take_first(values);
+            }
+        }
+        let moments_of_all = moments.iter_mut().flatten();
+        moments_of_all.for_each(|moments| together.take_first(moments));
+        self.frame_steps = frame_steps;
+        let restored = self.adam.restore(steps, moments);
+        restored.map_err(|_| TrainingError::Refused("moments of another model".into()))
+    }
+
+    /// What a step sends to other ranks and waits for them, so far.
+    pub fn traffic(&self) -> Traffic {
+        self.stepper.together.traffic()
+    }
+
     /// Trains from where the training stands to the end of the schedule, or until `observe`, called
     /// after every step, breaks.
     ///
@@ -224,10 +283,15 @@ impl<'d> Trainer<'d> {
         out: Option<&RunFolder>,
         observe: &mut dyn FnMut(&StepReport) -> ControlFlow<()>,
     ) -> Result<Outcome, TrainingError> {
-        let mut record = out.map(|run| Record::begin(run, self)).transpose()?;
+        let record = out.map(|run| Record::begin(run, self)).transpose();
+        let mut record = self
+            .stepper
+            .together
+            .agree(record.map_err(TrainingError::from))?;
         let steps = self.task.steps();
         while self.steps_done() < steps {
-            let report = match self.step().and_then(|report| self.score(report)) {
+            let report = self.step().map(|report| self.score(report));
+            let report = match report.and_then(|scored| self.stepper.together.agree(scored)) {
                 Ok(report) => report,
                 Err(error) => {
                     if let (TrainingError::NonFinite { .. }, Some(record)) = (&error, &mut record) {
@@ -236,15 +300,10 @@ impl<'d> Trainer<'d> {
                     return Err(error);
                 }
             };
-            let validation = self.validation.as_ref().zip(report.validation.as_ref());
-            let score = validation.and_then(|(by, scores)| by.deciding_score(scores));
-            if let Some(score) = score {
-                self.take_best(report.step, score, out)?;
-            }
-            if let Some(record) = &mut record {
-                record.step(self, &report)?;
-            }
-            if observe(&report).is_break() && report.step < steps {
+            let kept = self.keep(&report, record.as_mut());
+            self.stepper.together.agree(kept)?;
+            let stopping = observe(&report).is_break() && report.step < steps;
+            if self.stepper.together.any(stopping)? {
                 if let Some(record) = &mut record {
                     record.save(self)?;
                     record.end(self, RunState::Stopped)?;
@@ -265,6 +324,23 @@ impl<'d> Trainer<'d> {
         Ok(Outcome::Finished)
     }
 
+    /// Keeps what a step made: weights that are the best so far, a line of the log, a checkpoint.
+    fn keep(
+        &mut self,
+        report: &StepReport,
+        record: Option<&mut Record<'_>>,
+    ) -> Result<(), TrainingError> {
+        let validation = self.validation.as_ref().zip(report.validation.as_ref());
+        let score = validation.and_then(|(by, scores)| by.deciding_score(scores));
+        if let Some(score) = score {
+            self.take_best(report.step, score, record.as_ref().map(|record| record.run))?;
+        }
+        if let Some(record) = record {
+            record.step(self, report)?;
+        }
+        Ok(())
+    }
+
     /// About how long the steps that are left take: as the one in their middle does, which is tried
     /// on copies of the weights and the optimiser. None where none is left, or it fails.
     pub fn expected(&mut self) -> Option<Duration> {
@@ -282,15 +358,19 @@ impl<'d> Trainer<'d> {
             done,
         };
         let (mut parameters, mut adam) = (self.parameters.clone(), self.adam.clone());
+        let stepper = &mut self.stepper;
         let mut seconds = || {
             let start = Instant::now();
-            let result = self.stepper.step(input, &mut parameters, &mut adam);
-            result.ok().map(|_| start.elapsed().as_secs_f64())
+            let result = stepper.step(input, &mut parameters, &mut adam);
+            let taken = result.ok().map(|_| start.elapsed().as_secs_f64())?;
+            // Where it is short, a second is worth its time: where it is on any rank, on all.
+            let short = stepper.together.any(taken < 1.0).ok()?;
+            Some((taken, short))
         };
-        // The first fills the buffers; where it is short, a second is worth its time.
-        let mut taken = seconds()?;
-        if taken < 1.0 {
-            taken = seconds()?;
+        // The first fills the buffers.
+        let (mut taken, short) = seconds()?;
+        if short {
+            (taken, _) = seconds()?;
         }
         let left = self.task.frame_steps().saturating_sub(self.frame_steps);
         let seconds = taken * left as f64 / step.frames().max(1) as f64;
@@ -317,6 +397,7 @@ impl<'d> Trainer<'d> {
             columns: step.columns(),
             total: losses.total,
             losses: losses.terms,
+            watched: losses.watched,
             learning_rate,
             gradient_norm,
             frame_steps: self.frame_steps,
@@ -326,9 +407,11 @@ impl<'d> Trainer<'d> {
         })
     }
 
-    /// Scores the weights as they are on the validation clips where it is time to.
+    /// Scores the weights as they are on the validation clips where it is time to: on the first
+    /// rank.
     fn score(&self, mut report: StepReport) -> Result<StepReport, TrainingError> {
-        let validation = self.validation.as_ref();
+        let first = self.stepper.together.is_first();
+        let validation = self.validation.as_ref().filter(|_| first);
         let due = |it: &&Validation<'_>| it.is_due(report.step, self.task.steps());
         if let Some(validation) = validation.filter(due) {
             let model = self.model();

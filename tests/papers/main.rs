@@ -13,6 +13,8 @@ mod music_dance_data;
 mod real_data;
 #[path = "../common/small_run.rs"]
 mod small_run;
+#[path = "../common/thread_ranks.rs"]
+mod thread_ranks;
 
 mod network;
 mod small_training;
@@ -38,6 +40,7 @@ mod prior;
 mod pu2022;
 mod published;
 mod ranges;
+mod ranks;
 mod retrieval;
 mod root_frame;
 mod rotations;

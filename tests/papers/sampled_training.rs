@@ -16,7 +16,7 @@ use keydance::music::FeatureSet;
 use keydance::run::RunFolder;
 use keydance::training::Trainer;
 
-const SMALL: &str = r#"
+pub const SMALL: &str = r#"
 name = "small"
 [data]
 fps = 20.0
@@ -51,7 +51,7 @@ clip_norm = 0.5
 every_steps = 4
 "#;
 
-const MOGLOW: &str = r#"
+pub const MOGLOW: &str = r#"
 name = "small_moglow"
 [data]
 fps = 20.0
@@ -77,7 +77,7 @@ learning_rate = 1e-3
 every_steps = 4
 "#;
 
-fn config(text: &str, sets: &[&str]) -> ExperimentConfig {
+pub fn config(text: &str, sets: &[&str]) -> ExperimentConfig {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("config.toml");
     std::fs::write(&file, text).unwrap();
@@ -85,7 +85,7 @@ fn config(text: &str, sets: &[&str]) -> ExperimentConfig {
     ExperimentConfig::load(&file, &sets).unwrap()
 }
 
-fn dances(config: &ExperimentConfig) -> Dataset {
+pub fn dances(config: &ExperimentConfig) -> Dataset {
     let dances = generate_with_music(&ChoreographyConfig {
         clips: 8,
         frames_per_clip: 150,
@@ -107,6 +107,7 @@ fn train(trainer: &mut Trainer<'_>, run: Option<&RunFolder>, until: u64) {
 fn a_training_that_was_stopped_ends_at_the_same_bits() {
     for (text, sets) in [
         (SMALL, vec![]),
+        (SMALL, vec!["schedule.shards=3"]),
         (SMALL, vec!["model.norm=act", "schedule.shards=3"]),
         (
             SMALL,

@@ -87,6 +87,7 @@ impl<T: Real> Network<T> for Recurrence {
             critics: None,
             terms: vec![("reconstruction", total)],
             buffers: Vec::new(),
+            watched: Vec::new(),
         })
     }
 

@@ -40,6 +40,7 @@ impl Network<f32> for Witness {
             critics: None,
             terms: vec![("weight", total)],
             buffers: Vec::new(),
+            watched: Vec::new(),
         })
     }
 

@@ -425,6 +425,7 @@ impl Network<f32> for Cusp {
             terms: vec![("size", total)],
             critics: None,
             buffers: Vec::new(),
+            watched: Vec::new(),
         })
     }
 

@@ -3,13 +3,15 @@
 //! none.
 
 mod rooms;
+#[path = "../common/thread_ranks.rs"]
+mod thread_ranks;
 mod toy;
 
 use std::fs;
 use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Once;
+use std::sync::{Arc, Once};
 
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataPart, Dataset};
@@ -19,10 +21,12 @@ use keydance::experiment::{
 };
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::{Request, registry};
+use keydance::ranks::Alone;
 use keydance::run::{RunFolder, Subject};
 use keydance::training::measure::step_speed;
 use keydance::training::{Outcome, Resumed, Trainer, TrainingError};
 use tempfile::TempDir;
+use thread_ranks::on_each;
 use toy::{ToyKind, question};
 
 const CONFIG: &str = "name = 'toy'\n[data]\nsplit = { share = 0.7 }\n[model]\nkind = 'toy'\n\
@@ -106,6 +110,22 @@ fn it_is_trained_and_resumed_to_the_bit_with_its_running_mean() {
     assert_ne!(second.weights_digest(), digest);
     train(&mut second, &run, u64::MAX);
     assert_eq!(second.weights_digest(), digest);
+}
+
+#[test]
+fn its_running_mean_and_weights_are_those_of_one_process_on_ranks_too() {
+    let folder = configs();
+    let config = load(folder.path(), &[]);
+    let data = dataset(&config);
+    let (_, digest) = trained(folder.path(), &config, &data);
+    let ended = on_each(2, |rank| {
+        let mut trainer = Trainer::new(config.clone(), &data, 1).unwrap();
+        trainer.join(rank).unwrap();
+        let outcome = trainer.run(None, &mut |_| ControlFlow::Continue(()));
+        assert_eq!(outcome.unwrap(), Outcome::Finished);
+        trainer.weights_digest()
+    });
+    assert_eq!(ended, [digest.clone(), digest]);
 }
 
 #[test]
@@ -222,7 +242,9 @@ fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {
 fn what_it_does_not_have_is_said() {
     let folder = configs();
     let config = load(folder.path(), &[]);
-    let error = step_speed(&config, 20, 3, 1, 1).unwrap_err().to_string();
+    let error = step_speed(&config, 20, 3, 1, 1, Arc::new(Alone))
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("toy: has no made-up step"), "{error}");
     let options = GradientCheckOptions {
         frames: None,

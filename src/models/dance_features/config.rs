@@ -80,7 +80,7 @@ pub struct ScheduleConfig {
     pub steps: u64,
     /// Windows of a step.
     pub batch_size: usize,
-    /// Parts that a batch is computed in; 1 where norms need the whole batch.
+    /// Parts that a batch is computed in, on as many threads.
     pub shards: usize,
     /// Only training clips whose names begin with one of these; left out: all.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -6,6 +6,7 @@ use ndarray::{Array1, Array2, ArrayD, Ix2, IxDyn};
 use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
+use super::prior::least;
 use crate::autograd::ops::plu_product::PluFactors;
 use crate::autograd::{AutogradError, BlockId, BufferId, Real, Tape, Var};
 use crate::nn::Initialiser;
@@ -138,6 +139,12 @@ impl PluLinear {
         let matrix = tape.plu_product(factors, &rows, &signs)?;
         let y = tape.linear(x, matrix, None, false)?;
         Ok((y, tape.sum(factors.log_s)))
+    }
+
+    /// The least of log_s.
+    pub fn least_log_s<T: Real>(&self, tape: &mut Tape<'_, T>) -> f64 {
+        let log_s = tape.block(self.log_s);
+        least(tape.values(log_s))
     }
 
     /// x of `y [rows, D]`: two triangular solves, f64.

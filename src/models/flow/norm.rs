@@ -4,6 +4,7 @@ use ndarray::{Array1, Array2, ArrayD};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+use super::prior::least;
 use crate::autograd::{AutogradError, BlockId, BufferId, Parameters, Real, Tape, Var};
 use crate::nn::Initialiser;
 
@@ -205,6 +206,12 @@ impl FlowNorm {
             log_det: tape.affine(log_det, 1.0, -logs),
             buffers: statistics.buffers,
         })
+    }
+
+    /// The least of g or s.
+    pub fn least_log_scale<T: Real>(&self, tape: &mut Tape<'_, T>) -> f64 {
+        let log_scale = tape.block(self.log_scale);
+        least(tape.values(log_scale))
     }
 
     /// x of `y [rows, D]` by the stored statistics, f64.

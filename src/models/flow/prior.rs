@@ -6,7 +6,7 @@ use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use crate::autograd::{AutogradError, Real, Tape, Var};
-use crate::models::LossTerms;
+use crate::models::{LossTerms, Watched};
 
 /// ln 2 pi.
 pub const LN_TAU: f64 = 1.837_877_066_409_345_3;
@@ -32,6 +32,17 @@ pub fn noise_like(
     })
 }
 
+/// The least of some numbers.
+pub(super) fn least<T: Real>(values: &[T]) -> f64 {
+    let values = values.iter().map(|&x| Real::to_f64(x));
+    values.fold(f64::INFINITY, f64::min)
+}
+
+/// A block of a flow whose logarithms are this small hardly lets a channel through.
+const LEAST_LOG: f64 = -7.0;
+const ADVICE: &str = "a block of the flow all but loses a channel; try a lower \
+                      optimiser.learning_rate or fewer model.blocks";
+
 /// What a flow makes of rows of D channels, as far as its likelihood follows from it.
 pub struct Density<'f> {
     /// z, `[rows, D]`.
@@ -42,6 +53,8 @@ pub struct Density<'f> {
     pub linears: Var,
     /// Scales of the couplings: their logarithms add up to the couplings' ln |det|.
     pub scales: &'f [Var],
+    /// The least logarithm of a factor in the norms, and in the linear layers.
+    pub least: [f64; 2],
 }
 
 impl Density<'_> {
@@ -62,7 +75,9 @@ impl Density<'_> {
         let norms = tape.affine(self.norms, -rows * unit, 0.0);
         let linears = tape.affine(self.linears, -rows * unit, 0.0);
         let mut couplings = tape.constant_with(&[1], |out| out.fill(T::zero()));
+        let mut least_scale = f64::INFINITY;
         for &scale in self.scales {
+            least_scale = least_scale.min(least(tape.values(scale)));
             let logs = tape.ln(scale);
             let sum = tape.sum(logs);
             let nats = tape.affine(sum, -unit, 0.0);
@@ -74,6 +89,20 @@ impl Density<'_> {
             ("linear", 1.0, linears),
             ("coupling", 1.0, couplings),
         ];
-        LossTerms::weighted(tape, &terms, None)
+        let mut losses = LossTerms::weighted(tape, &terms, None)?;
+        let [norm, linear] = self.least;
+        let watched = [
+            ("log_norm", norm),
+            ("log_s", linear),
+            ("log_scale", least_scale.ln()),
+        ];
+        let watched = watched.map(|(name, least)| Watched {
+            name,
+            least,
+            bound: LEAST_LOG,
+            advice: ADVICE,
+        });
+        losses.watched = watched.to_vec();
+        Ok(losses)
     }
 }

@@ -51,6 +51,8 @@ struct Output {
     linears: Var,
     scales: Vec<Var>,
     states: Vec<Vec<Var>>,
+    /// As in [`Density::least`].
+    least: [f64; 2],
 }
 
 impl Moglow2020 {
@@ -91,12 +93,18 @@ impl Moglow2020 {
             linears: zero,
             scales: Vec::new(),
             states: Vec::new(),
+            least: [f64::INFINITY; 2],
         };
         for block in &self.blocks {
             let normed = block.norm.forward(tape, output.z, false)?;
             let (mixed, log_det) = block.linear.forward(tape, normed.y)?;
             let states = block.coupling.start(tape, batch.sequences);
             let coupled = block.coupling.forward(tape, mixed, condition, &states)?;
+            let least = [
+                block.norm.least_log_scale(tape),
+                block.linear.least_log_s(tape),
+            ];
+            output.least = [0, 1].map(|k| output.least[k].min(least[k]));
             output.norms = tape.add(output.norms, normed.log_det)?;
             output.linears = tape.add(output.linears, log_det)?;
             output.scales.push(coupled.scale);
@@ -171,6 +179,7 @@ impl Moglow2020 {
             norms: output.norms,
             linears: output.linears,
             scales: &output.scales,
+            least: output.least,
         };
         density.loss(tape, 1.0 / (batch.total_sequences as f64 * frames * LN_2))
     }

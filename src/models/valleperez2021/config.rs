@@ -194,10 +194,6 @@ impl ValleperezSettings {
         let own = model.head == Head::Flow || model.target == TargetKind::Pose;
         let expected = "\"pose\" where model.head is \"deterministic\"";
         ValueError::unless(own, "model.target", "another", expected)?;
-        let whole = model.head == Head::Deterministic || model.norm == NormKind::Act;
-        let expected = "1 where model.norm is \"batch\": its statistics are those of a whole batch";
-        let shards = self.schedule.shards;
-        ValueError::unless(whole || shards == 1, "schedule.shards", shards, expected)?;
         self.schedule.check()?;
         self.augmentation.check()?;
         self.generation.check()

@@ -39,6 +39,8 @@ pub struct FlowOutput {
     pub buffers: Vec<(BufferId, Vec<f64>)>,
     /// What each block's norm, linear layer and coupling give, with the coupling's shift.
     pub stages: Vec<[Var; 4]>,
+    /// The least logarithm of a factor in the norms, and in the linear layers.
+    pub least: [f64; 2],
 }
 
 impl Flow {
@@ -91,6 +93,7 @@ impl Flow {
             scales: Vec::new(),
             buffers: Vec::new(),
             stages: Vec::new(),
+            least: [f64::INFINITY; 2],
         };
         for block in &self.blocks {
             block.forward(tape, &mut output, h, self.frames, training)?;
@@ -159,6 +162,11 @@ impl Block {
         so_far.norms = tape.add(so_far.norms, normed.log_det)?;
         so_far.linears = tape.add(so_far.linears, log_det)?;
         so_far.scales.push(coupled.scale);
+        let least = [
+            self.norm.least_log_scale(tape),
+            self.linear.least_log_s(tape),
+        ];
+        so_far.least = [0, 1].map(|k| so_far.least[k].min(least[k]));
         so_far.buffers.extend(normed.buffers);
         so_far
             .stages

@@ -149,6 +149,20 @@ impl Valleperez2021 {
         training: bool,
     ) -> Result<LossTerms, AutogradError> {
         let h = self.latent(tape, batch)?;
+        self.losses_by(tape, batch, h, training)
+    }
+
+    /// The same by the latent of the batch.
+    ///
+    /// # Errors
+    /// A batch of other sizes.
+    pub fn losses_by<T: Real>(
+        &self,
+        tape: &mut Tape<'_, T>,
+        batch: &WindowBatch<T>,
+        h: Var,
+        training: bool,
+    ) -> Result<LossTerms, AutogradError> {
         if self.flow.is_none() {
             let target = tape.constant(batch.target.clone());
             let difference = tape.sub(target, h)?;
@@ -166,6 +180,7 @@ impl Valleperez2021 {
             norms: output.norms,
             linears: output.linears,
             scales: &output.scales,
+            least: output.least,
         };
         let mut losses = density.loss(tape, unit)?;
         losses.buffers = output.buffers;

@@ -10,12 +10,13 @@ use super::config::{LinearInit, TargetKind, ValleperezSettings};
 use super::generator::{Reference, TrainedValleperez};
 use super::network::{Valleperez2021, WindowBatch};
 use super::target::{LOOK_BACK, Target};
-use crate::autograd::{AutogradError, Parameters, Tape};
+use crate::autograd::{AutogradError, Parameters, Tape, Var};
 use crate::counted::counted;
 use crate::models::dance_features::{DanceData, Epochs, Piece, with_noise};
+use crate::models::flow::NormKind;
 use crate::models::settings::{InitialRng, TaskSetting};
 use crate::models::transition::parts;
-use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
+use crate::models::{Generator, LossTerms, Meeting, ModelError, Statistics, Step, Streams, Task};
 use crate::nn::Initialiser;
 
 /// The training of a network on dances with their music.
@@ -221,6 +222,33 @@ struct ValleperezStep<'t> {
     step: u64,
 }
 
+impl ValleperezStep<'_> {
+    /// Windows of a shard.
+    fn batch_of(&self, shard: usize) -> WindowBatch<f32> {
+        let total = self.task.settings.schedule.batch_size;
+        let range = parts(total, self.shards()).nth(shard).unwrap_or(0..0);
+        self.task.batch(self.step, range)
+    }
+
+    /// Losses of windows with the density of the frames themselves: the targets are these over
+    /// their deviations.
+    fn of_frames(
+        &self,
+        tape: &mut Tape<'_, f32>,
+        batch: &WindowBatch<f32>,
+        mut losses: LossTerms,
+    ) -> Result<LossTerms, AutogradError> {
+        if self.task.settings.model.target != TargetKind::Pose {
+            let bits = self.task.reference.target.log_deviations() / std::f64::consts::LN_2;
+            let share = batch.windows as f64 / batch.total_windows as f64;
+            let bits = tape.constant_with(&[1], |out| out.fill((bits * share) as f32));
+            losses.total = tape.add(losses.total, bits)?;
+            losses.terms.push(("target", bits));
+        }
+        Ok(losses)
+    }
+}
+
 impl Step<f32> for ValleperezStep<'_> {
     fn shards(&self) -> usize {
         self.task.settings.schedule.shards
@@ -232,23 +260,32 @@ impl Step<f32> for ValleperezStep<'_> {
     }
 
     fn losses(&self, tape: &mut Tape<'_, f32>, shard: usize) -> Result<LossTerms, AutogradError> {
-        let total = self.task.settings.schedule.batch_size;
-        let range = parts(total, self.shards()).nth(shard).unwrap_or(0..0);
-        let batch = self.task.batch(self.step, range);
-        let mut losses = self.task.network.losses(tape, &batch, true)?;
-        let task = self.task;
-        if task.settings.model.target != TargetKind::Pose {
-            // The density of the frames themselves: the targets are these over their deviations.
-            let bits = task.reference.target.log_deviations() / std::f64::consts::LN_2;
-            let share = batch.windows as f64 / total as f64;
-            let bits = tape.constant_with(&[1], |out| out.fill((bits * share) as f32));
-            losses.total = tape.add(losses.total, bits)?;
-            losses.terms.push(("target", bits));
-        }
-        Ok(losses)
+        let batch = self.batch_of(shard);
+        let losses = self.task.network.losses(tape, &batch, true)?;
+        self.of_frames(tape, &batch, losses)
+    }
+
+    /// Batch norm's statistics are those of the whole batch: its shards encode, the flow is one.
+    fn meeting(&self) -> Option<&dyn Meeting<f32>> {
+        let whole = self.task.network.is_flow() && self.task.settings.model.norm == NormKind::Batch;
+        whole.then_some(self)
     }
 
     fn describe(&self) -> String {
         counted(self.task.settings.schedule.batch_size, "window")
+    }
+}
+
+impl Meeting<f32> for ValleperezStep<'_> {
+    fn bring(&self, tape: &mut Tape<'_, f32>, shard: usize) -> Result<Var, AutogradError> {
+        self.task.network.latent(tape, &self.batch_of(shard))
+    }
+
+    fn losses(&self, tape: &mut Tape<'_, f32>, together: Var) -> Result<LossTerms, AutogradError> {
+        let windows = 0..self.task.settings.schedule.batch_size;
+        let batch = self.task.batch(self.step, windows);
+        let network = &self.task.network;
+        let losses = network.losses_by(tape, &batch, together, true)?;
+        self.of_frames(tape, &batch, losses)
     }
 }
