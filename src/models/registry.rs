@@ -5,7 +5,10 @@ use std::sync::{Arc, PoisonError, RwLock};
 use super::settings::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::{
-    baselines::{retrieval::KeyPoseRetrievalKind, rotations::RotationBaseline},
+    baselines::{
+        linear_gaussian::LinearGaussianKind, retrieval::KeyPoseRetrievalKind,
+        rotations::RotationBaseline,
+    },
     duan2022::Duan2022Kind,
     harvey2020::Harvey2020RotationsKind,
     li2023::Li2023Kind,
@@ -53,6 +56,8 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         Arc::new(RotationBaseline::HeldSeed),
         #[cfg(feature = "papers")]
         Arc::new(KeyPoseRetrievalKind),
+        #[cfg(feature = "papers")]
+        Arc::new(LinearGaussianKind),
     ]
 }
 

@@ -31,6 +31,7 @@ mod harvey2020;
 mod in_betweening;
 mod interpolation;
 mod li2023;
+mod linear_gaussian;
 mod mapped_model;
 mod metrics;
 mod music_dance;

@@ -10,6 +10,7 @@ use super::transition::{Transition, TransitionRequest};
 use crate::motion::features::{FACING, ROOT_POSITION, write_velocities};
 
 pub mod interpolation;
+pub mod linear_gaussian;
 pub mod linear_positions;
 pub mod retrieval;
 pub mod rotations;
