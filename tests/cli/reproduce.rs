@@ -397,6 +397,25 @@ fn rows_trained_at_the_same_time_end_as_one_after_the_other() {
 }
 
 #[test]
+fn a_row_that_begins_with_the_weights_of_another_is_listed_before_these_are_trained() {
+    let place = TempDir::new().unwrap();
+    let configs = place.path().join("configs");
+    fs::create_dir(&configs).unwrap();
+    let first = FIXTURE.path("configs").join("one_lstm.toml");
+    fs::copy(&first, configs.join("one_lstm.toml")).unwrap();
+    let base = FIXTURE.path("configs").join("whole_model.toml");
+    fs::copy(&base, configs.join("whole_model.toml")).unwrap();
+    let further = "base = 'one_lstm.toml'\nname = 'further'\nstart = 'one_lstm'\n";
+    fs::write(configs.join("further.toml"), further).unwrap();
+    let mut command = reproduce_with(place.path(), "configs", &configs);
+    let listed = command.arg("--list").assert().success();
+    let text = String::from_utf8(listed.get_output().stdout.clone()).unwrap();
+    let row = text.lines().find(|line| line.ends_with("further"));
+    let hours: f64 = row.unwrap().split('\t').nth(1).unwrap().parse().unwrap();
+    assert!(hours >= 0.0 && hours.is_finite());
+}
+
+#[test]
 fn tasks_in_processes_of_their_own_at_the_same_time_make_the_tables_of_one() {
     let place = TempDir::new().unwrap();
     // Refined or not, weights are the same: one task.
