@@ -1,11 +1,14 @@
 use std::process::ExitCode;
 
-use clap::Parser as _;
-use keydance::cli::{self, Cli};
+use keydance::{cli, ranks};
 
 fn main() -> ExitCode {
-    match Cli::parse().run() {
-        Ok(code) => code,
+    match cli::parse().run() {
+        Ok(code) => {
+            ranks::leave();
+            code
+        }
+        // Without a farewell: other ranks may wait for this one, which their launcher then ends.
         Err(error) => cli::report(&error),
     }
 }

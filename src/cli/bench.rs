@@ -87,7 +87,14 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
     let (threads, repetitions) = (args.threads.into(), args.repetitions.into());
     print(
         args.json,
-        &step_speed(&config, frames, batch, threads, repetitions, ranks::join()?)?,
+        &step_speed(
+            &config,
+            frames,
+            batch,
+            threads,
+            repetitions,
+            ranks::join("bench-step")?,
+        )?,
     )
 }
 

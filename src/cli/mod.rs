@@ -33,17 +33,20 @@ mod watched;
 use std::io;
 use std::process::ExitCode;
 use std::sync::LazyLock;
+use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 
 use self::notice::notice;
 use crate::autograd::kernels::Isa;
-use crate::ranks;
+use crate::ranks::{self, RanksError};
 use crate::run::manifest::Build;
 use crate::training::TrainingError;
 
 /// Exit code of a training that ended because a loss or gradient was not finite.
 const DIVERGED: u8 = 3;
+/// How long a rank that says nothing waits for the first to speak.
+const MUTE: Duration = Duration::from_secs(1);
 /// Exit code where what read the output no longer does: that of a program which SIGPIPE ends.
 const OUTPUT_CLOSED: u8 = 141;
 
@@ -171,14 +174,38 @@ impl Cli {
     }
 }
 
+/// The command line; ends the process where that is none, or asks for help.
+pub fn parse() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        if notice::is_mute() {
+            let_the_first_speak();
+            std::process::exit(error.exit_code());
+        }
+        error.exit()
+    })
+}
+
+/// A launcher kills the other ranks once one has ended with an error.
+fn let_the_first_speak() {
+    if notice::is_mute() {
+        std::thread::sleep(MUTE);
+    }
+}
+
 /// Says what went wrong; the exit code of it.
 pub fn report(error: &anyhow::Error) -> ExitCode {
+    if let Some(error @ RanksError::NotBuilt { .. }) = error.downcast_ref() {
+        // None of the ranks can speak for this one.
+        notice::of_any_rank(format_args!("error: {error}"));
+        return ExitCode::FAILURE;
+    }
     // What reads the output, such as `head`, has seen enough of it.
     let mut causes = error.chain().filter_map(|cause| cause.downcast_ref());
     if causes.any(|cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe) {
         return ExitCode::from(OUTPUT_CLOSED);
     }
     notice(format_args!("error: {error:#}"));
+    let_the_first_speak();
     match error.downcast_ref() {
         Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
         _ => ExitCode::FAILURE,

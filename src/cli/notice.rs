@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use crate::ranks;
 
 /// Whether this process says nothing: of several that train together the first speaks for all.
-fn is_mute() -> bool {
+pub fn is_mute() -> bool {
     ranks::launched().is_some_and(|(rank, _)| rank > 0)
 }
 
@@ -22,8 +22,13 @@ pub fn out() -> Box<dyn Write> {
 /// worth more than its progress lines.
 pub fn notice(line: impl Display) {
     if !is_mute() {
-        let _ = writeln!(io::stderr(), "{line}");
+        of_any_rank(line);
     }
+}
+
+/// The same from whichever process.
+pub fn of_any_rank(line: impl Display) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Warnings that the library gives beside what it read, a line each on stderr.

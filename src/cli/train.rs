@@ -83,7 +83,7 @@ impl Loaded {
 /// The config, the data or the run's folder cannot be used; the training diverged; another rank
 /// cannot go on.
 pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
-    let ranks = ranks::join()?;
+    let ranks = ranks::join("train")?;
     let mut together = Together::new(Arc::clone(&ranks));
     let loaded = together.agree(Loaded::read(&args))?;
     let threads = args.threads.count();

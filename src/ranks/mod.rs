@@ -86,16 +86,26 @@ pub fn launched() -> Option<(usize, usize)> {
     of("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE").or_else(|| of("PMI_RANK", "PMI_SIZE"))
 }
 
-/// The ranks that an MPI launcher has started with this one; [`Alone`] without one.
+/// The ranks that an MPI launcher has started with this one, all for the same command; [`Alone`]
+/// without one.
 ///
 /// # Errors
-/// MPI does not start, or the program was built without it.
-pub fn join() -> Result<Arc<dyn Ranks>, RanksError> {
-    match launched() {
-        None | Some((_, 1)) => Ok(Arc::new(Alone)),
+/// MPI does not start, or the program was built without it; a rank has another command.
+pub fn join(command: &str) -> Result<Arc<dyn Ranks>, RanksError> {
+    let ranks: Arc<dyn Ranks> = match launched() {
+        None | Some((_, 1)) => Arc::new(Alone),
         #[cfg(feature = "mpi")]
-        Some(_) => Ok(Arc::new(mpi::Mpi::start()?)),
+        Some(_) => Arc::new(mpi::Mpi::start()?),
         #[cfg(not(feature = "mpi"))]
-        Some((rank, count)) => Err(RanksError::NotBuilt { rank, count }),
-    }
+        Some((rank, count)) => return Err(RanksError::NotBuilt { rank, count }),
+    };
+    let own = Identity(vec![("command".into(), command.into())]);
+    Identity::agree(&Together::new(Arc::clone(&ranks)).share(own)?)?;
+    Ok(ranks)
+}
+
+/// What a process does last where nothing failed: all wait here for each other.
+pub fn leave() {
+    #[cfg(feature = "mpi")]
+    mpi::leave();
 }

@@ -1,7 +1,7 @@
 //! Ranks over MPI.
 
 use std::fmt;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
@@ -18,8 +18,15 @@ const MOST: usize = 1 << 26;
 pub struct Mpi {
     rank: usize,
     count: usize,
-    /// MPI ends with it.
-    _universe: Mutex<Universe>,
+}
+
+/// MPI ends with it.
+static UNIVERSE: Mutex<Option<Universe>> = Mutex::new(None);
+
+/// Waits until all ranks leave, and ends MPI.
+pub(super) fn leave() {
+    let mut universe = UNIVERSE.lock().unwrap_or_else(PoisonError::into_inner);
+    drop(universe.take());
 }
 
 impl fmt::Debug for Mpi {
@@ -39,11 +46,9 @@ impl Mpi {
         if threading < Threading::Serialized {
             return Err(RanksError::NoMpi);
         }
-        Ok(Self {
-            rank,
-            count,
-            _universe: Mutex::new(universe),
-        })
+        let mut kept = UNIVERSE.lock().unwrap_or_else(PoisonError::into_inner);
+        *kept = Some(universe);
+        Ok(Self { rank, count })
     }
 }
 

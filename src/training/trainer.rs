@@ -178,7 +178,13 @@ impl<'d> Trainer<'d> {
             own.unwrap_or_default(),
             counted(self.task.steps(), "step"),
             self.task.frame_steps(),
-            counted(self.threads, "thread")
+            match self.stepper.together.count() {
+                1 => counted(self.threads, "thread"),
+                ranks => format!(
+                    "{} on each of {ranks} ranks",
+                    counted(self.threads, "thread")
+                ),
+            }
         )
     }
 
@@ -190,7 +196,8 @@ impl<'d> Trainer<'d> {
         let idle = (self.threads * ranks).saturating_sub(shards);
         if idle > 0 {
             warnings.push(format!(
-                "{} to do: a step has {} (schedule.shards), and a thread computes one at a time",
+                "{} to do: a step has {} (schedule.shards), and a thread computes one at a time; give \
+                 fewer threads, or a new training more shards",
                 match idle {
                     1 => "1 thread has nothing".into(),
                     idle => format!("{idle} threads have nothing"),
@@ -238,15 +245,16 @@ impl<'d> Trainer<'d> {
     /// # Errors
     /// Another rank has another program, config or data; then on every rank.
     pub fn join(&mut self, ranks: Arc<dyn Ranks>) -> Result<(), TrainingError> {
-        let together = &mut self.stepper.together;
-        *together = Together::new(ranks);
         let own = [
             ("program", Build::this().to_string()),
             ("instruction set", manifest::instructions()),
             ("config", file_digest(self.config_toml.as_bytes())),
             ("data", self.dataset.digest.clone()),
+            ("start", self.statistics_digest()?),
         ];
         let own = own.map(|(name, value)| (name.to_owned(), value));
+        let together = &mut self.stepper.together;
+        *together = Together::new(ranks);
         Identity::agree(&together.share(Identity(own.to_vec()))?)?;
         let place = together.share((self.adam.steps(), self.frame_steps))?;
         let (steps, frame_steps) = place[0];
@@ -262,6 +270,13 @@ impl<'d> Trainer<'d> {
         self.frame_steps = frame_steps;
         let restored = self.adam.restore(steps, moments);
         restored.map_err(|_| TrainingError::Refused("moments of another model".into()))
+    }
+
+    /// SHA-256 of what the task knows of its data, that of a start among it.
+    fn statistics_digest(&self) -> Result<String, RunError> {
+        let none = Parameters::new();
+        let file = weights::to_safetensors(&none, &self.task.statistics(), &self.config_toml)?;
+        Ok(file_digest(&file))
     }
 
     /// What a step sends to other ranks and waits for them, so far.

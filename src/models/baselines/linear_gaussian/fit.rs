@@ -66,7 +66,14 @@ impl Fitted {
             .sum::<usize>();
         let d = pieces.first().map_or(0, Array2::ncols);
         if count == 0 || d == 0 {
-            return Err(ModelError::NoFrames { rows: count });
+            let longest = pieces.iter().map(Array2::nrows).max().unwrap_or(0);
+            return Err(ModelError::Data {
+                reason: format!(
+                    "no training clip has the {} frames of a window, the longest has {longest}; \
+                     give longer clips, or shorter model.motion_context and model.audio_past",
+                    contexts.past() + contexts.future()
+                ),
+            });
         }
         let (inputs, outputs) = (LOOK_BACK * d + 1, together * d);
         let mut matrix = DMatrix::zeros(inputs, outputs);
