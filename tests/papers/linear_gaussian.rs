@@ -1,5 +1,5 @@
-//! The linear Gaussian baseline: the likelihoods that are known of the Motorica dances, and the laws
-//! of what is fitted.
+//! The linear Gaussian baseline: the likelihoods that are known of the Motorica dances, and the
+//! laws of what is fitted.
 
 use keydance::data::{DataPart, Dataset};
 use keydance::evaluation::sampled_dance::Likelihood;
