@@ -100,16 +100,19 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
         &[]
     }
 
-    /// The steps of its training, its weights added through `init`.
+    /// The steps of its training, its weights added through `init`; none of a model that needs no
+    /// training.
     ///
     /// # Errors
     /// A model that is not trained, data that it cannot be trained on, more weights than `init`
     /// allows.
     fn task<'d>(
         &self,
-        setting: &TaskSetting<'d>,
-        init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError>;
+        _setting: &TaskSetting<'d>,
+        _init: &mut Initialiser<'_, f32, InitialRng>,
+    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
+        Err(without_weights(self.kind()))
+    }
 
     /// Steps to time: each `batch` windows of `frames` frames, made up.
     ///
@@ -128,8 +131,10 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     /// The model with saved weights.
     ///
     /// # Errors
-    /// The weights are those of another model.
-    fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError>;
+    /// The weights are those of another model; a model that has none.
+    fn trained(&self, _name: &str, _saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
+        Err(without_weights(self.kind()).into())
+    }
 
     /// The model, where it needs no training.
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
@@ -163,6 +168,14 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     }
 
     fn clone_box(&self) -> Box<dyn ModelSettings>;
+}
+
+/// The error of a model that is to be trained and needs no training.
+pub(super) fn without_weights(model: &str) -> ModelError {
+    ModelError::Model {
+        model: model.into(),
+        reason: "has no weights and needs no training; evaluate its config as it is".into(),
+    }
 }
 
 /// The error of a model that is asked for what it does not have.

@@ -9,13 +9,9 @@ use crate::data::DataConfig;
 use crate::evaluation::music_dance::PU2022;
 use crate::models::generator::{Motion, NeededPoses, Needs, Request};
 use crate::models::li2023;
-use crate::models::settings::{
-    InitialRng, LoadError, ModelKind, ModelSettings, Paper, TaskSetting, ValueError,
-};
-use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Task};
+use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::{Generator, ModelError};
 use crate::motion::Pose;
-use crate::nn::Initialiser;
 
 /// A baseline without weights: a line of the registry, and the model itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,22 +87,6 @@ impl ModelSettings for Settings {
         Table::try_from(self)
     }
 
-    fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
-        Ok(())
-    }
-
-    fn task<'d>(
-        &self,
-        _setting: &TaskSetting<'d>,
-        _init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
-        Err(self.model.kind.untrained())
-    }
-
-    fn trained(&self, _name: &str, _saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        Err(self.model.kind.untrained().into())
-    }
-
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         Some(Box::new(self.model.kind))
     }
@@ -117,13 +97,6 @@ impl ModelSettings for Settings {
 }
 
 impl RotationBaseline {
-    fn untrained(self) -> ModelError {
-        ModelError::Model {
-            model: self.title().into(),
-            reason: "has no weights and needs no training; evaluate its config as it is".into(),
-        }
-    }
-
     /// Poses of every frame, `[F]`; none without a given one.
     fn poses(self, request: &Request) -> Vec<Pose> {
         let given = request.given.iter().filter(|given| given.frame >= 0);

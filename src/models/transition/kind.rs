@@ -12,7 +12,7 @@ use crate::models::baselines::linear_positions::LinearPositions;
 use crate::models::baselines::zero_velocity::ZeroVelocity;
 use crate::models::harvey2020::{Harvey2020, Harvey2020Config};
 use crate::models::pan2021::{Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
-use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
+use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError, without_weights};
 use crate::models::{Generator, ModelError, li2023};
 use crate::motion::Mapping;
 use crate::nn::Initialiser;
@@ -140,11 +140,7 @@ impl ModelConfig {
             Self::Pan2021(config) => Box::new(Pan2021::new(init, config, standardisation)?),
             Self::Harvey2020(config) => Box::new(Harvey2020::new(init, config, standardisation)?),
             Self::Interpolation(_) | Self::LinearPositions(_) | Self::ZeroVelocity(_) => {
-                return Err(ModelError::Model {
-                    model: self.kind().into(),
-                    reason: "has no weights and needs no training; evaluate its config as it is"
-                        .into(),
-                });
+                return Err(without_weights(self.kind()));
             }
         };
         match init.exceeded() {

@@ -6,11 +6,9 @@ use toml::Table;
 use super::NAME;
 use super::generator::LinearGaussian;
 use crate::data::DataConfig;
+use crate::models::Generator;
 use crate::models::dance_features::{Contexts, FeaturesConfig, GenerationConfig};
-use crate::models::settings::{InitialRng, LoadError, ModelSettings, TaskSetting, ValueError};
-use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Task};
-use crate::nn::Initialiser;
+use crate::models::settings::{ModelSettings, ValueError};
 
 /// What the next frames are expected to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -141,30 +139,11 @@ impl ModelSettings for Settings {
         ]
     }
 
-    fn task<'d>(
-        &self,
-        _setting: &TaskSetting<'d>,
-        _init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
-        Err(untrained())
-    }
-
-    fn trained(&self, _name: &str, _saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        Err(untrained().into())
-    }
-
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         Some(Box::new(LinearGaussian::new(self.clone())))
     }
 
     fn clone_box(&self) -> Box<dyn ModelSettings> {
         Box::new(self.clone())
-    }
-}
-
-fn untrained() -> ModelError {
-    ModelError::Model {
-        model: NAME.into(),
-        reason: "has no weights and is fitted, not trained; evaluate its config as it is".into(),
     }
 }

@@ -15,13 +15,9 @@ use toml::Table;
 use crate::data::{DataConfig, Recording};
 use crate::evaluation::music_dance::PU2022;
 use crate::models::generator::{Motion, NeededPoses, Needs, Request};
-use crate::models::settings::{
-    InitialRng, LoadError, ModelKind, ModelSettings, Paper, TaskSetting, ValueError,
-};
-use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Task};
+use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
+use crate::models::{Generator, ModelError};
 use crate::motion::Pose;
-use crate::nn::Initialiser;
 use library::Library;
 use placed::placed;
 
@@ -91,18 +87,6 @@ impl ModelSettings for Settings {
         ValueError::unless(frames > 0, key, frames, expected)
     }
 
-    fn task<'d>(
-        &self,
-        _setting: &TaskSetting<'d>,
-        _init: &mut Initialiser<'_, f32, InitialRng>,
-    ) -> Result<Box<dyn Task<f32> + 'd>, ModelError> {
-        Err(untrained())
-    }
-
-    fn trained(&self, _name: &str, _saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        Err(untrained().into())
-    }
-
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         Some(Box::new(KeyPoseRetrieval {
             blend_frames: self.model.blend_frames,
@@ -112,13 +96,6 @@ impl ModelSettings for Settings {
 
     fn clone_box(&self) -> Box<dyn ModelSettings> {
         Box::new(self.clone())
-    }
-}
-
-fn untrained() -> ModelError {
-    ModelError::Model {
-        model: NAME.into(),
-        reason: "has no weights and needs no training; evaluate its config as it is".into(),
     }
 }
 
