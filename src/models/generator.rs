@@ -208,10 +208,10 @@ pub trait Generator: Send + Sync {
     /// As [`Generator::generate`]; a model that has none.
     fn log_likelihoods(
         &self,
-        _requests: &[Request],
-        _truths: &[Motion],
+        requests: &[Request],
+        truths: &[Motion],
     ) -> Result<Vec<f64>, ModelError> {
-        Err(self.lacks("likelihood"))
+        self.log_likelihoods_knowing(requests, requests, truths)
     }
 
     /// The same where what the network knows is that of other requests, one for each: how much it

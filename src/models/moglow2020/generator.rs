@@ -204,17 +204,8 @@ impl Generator for TrainedMoglow {
         requests.iter().enumerate().map(dance).collect()
     }
 
-    /// Of the frames behind the seed, after the state has run over the seed.
-    fn log_likelihoods(
-        &self,
-        requests: &[Request],
-        truths: &[Motion],
-    ) -> Result<Vec<f64>, ModelError> {
-        self.log_likelihoods_knowing(requests, requests, truths)
-    }
-
-    /// Past and music are those of what is known, in the condition of every frame; what the state
-    /// ran over, too.
+    /// Of the frames behind the seed, after the state has run over the seed. Past and music are
+    /// those of what is known, in the condition of every frame; what the state ran over, too.
     fn log_likelihoods_knowing(
         &self,
         known: &[Request],

@@ -297,14 +297,6 @@ impl Generator for TrainedValleperez {
         motions.collect()
     }
 
-    fn log_likelihoods(
-        &self,
-        requests: &[Request],
-        truths: &[Motion],
-    ) -> Result<Vec<f64>, ModelError> {
-        self.log_likelihoods_knowing(requests, requests, truths)
-    }
-
     fn log_likelihoods_knowing(
         &self,
         known: &[Request],

@@ -119,14 +119,6 @@ impl Generator for LinearGaussian {
             .collect()
     }
 
-    fn log_likelihoods(
-        &self,
-        requests: &[Request],
-        truths: &[Motion],
-    ) -> Result<Vec<f64>, ModelError> {
-        self.log_likelihoods_knowing(requests, requests, truths)
-    }
-
     /// What a network would know changes nothing: the frames that are looked at go by the truth.
     fn log_likelihoods_knowing(
         &self,
