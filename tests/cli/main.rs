@@ -31,6 +31,7 @@ mod examples;
 mod figures;
 mod generate;
 mod help;
+mod launched;
 mod music;
 mod odd_files;
 mod outputs;

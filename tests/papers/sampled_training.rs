@@ -146,6 +146,47 @@ fn a_training_that_was_stopped_ends_at_the_same_bits() {
     }
 }
 
+#[test]
+fn the_least_factors_of_a_flow_are_watched_and_out_of_bounds_they_alarm() {
+    for text in [SMALL, MOGLOW] {
+        let config = config(text, &[]);
+        let data = dances(&config);
+        let mut trainer = Trainer::new(config, &data, 1).unwrap();
+        let mut reports = Vec::new();
+        let outcome = trainer.run(None, &mut |report| {
+            reports.push(report.clone());
+            ControlFlow::Continue(())
+        });
+        outcome.unwrap();
+        let mut last = reports.pop().unwrap();
+        let names: Vec<&str> = last.watched.iter().map(|it| it.name).collect();
+        assert_eq!(names, ["log_norm", "log_s", "log_scale"]);
+        assert!(last.watched.iter().all(|it| it.least.is_finite()));
+        assert_eq!(last.alarms().count(), 0);
+        let line = serde_json::to_value(&last).unwrap();
+        assert_eq!(line["watched"]["log_s"], last.watched[1].least);
+        last.watched[1].least = last.watched[1].bound - 0.1;
+        let alarms: Vec<&str> = last.alarms().map(|it| it.name).collect();
+        assert_eq!(alarms, ["log_s"]);
+    }
+}
+
+#[test]
+fn threads_without_a_shard_are_told_before_a_training_begins() {
+    let config = config(MOGLOW, &["schedule.shards=2"]);
+    let data = dances(&config);
+    let idle = |threads: usize| {
+        let trainer = Trainer::new(config.clone(), &data, threads).unwrap();
+        let warnings = trainer.warnings().into_iter();
+        warnings
+            .filter(|it| it.contains("to do"))
+            .collect::<Vec<_>>()
+    };
+    assert!(idle(1).is_empty() && idle(2).is_empty());
+    assert!(idle(3)[0].starts_with("1 thread has nothing to do: a step has 2 shards"));
+    assert!(idle(5)[0].starts_with("3 threads have nothing to do"));
+}
+
 /// The beginning of the first test clip with its song, for a dance of 30 frames.
 fn request(model: &dyn Generator, data: &Dataset, seed: u64) -> Request {
     let recording = &data.test[0];
