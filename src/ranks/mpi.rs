@@ -11,7 +11,7 @@ use mpi::{Count, Rank, Threading};
 
 use super::{Ranks, RanksError};
 
-/// Most values of one message: what MPI counts in 32 bits, and a share of a pipeline.
+/// Most values of one message, whose bytes MPI counts in 32 bits.
 const MOST: usize = 1 << 26;
 
 /// All processes that the launcher has started.

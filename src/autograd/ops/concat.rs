@@ -45,9 +45,9 @@ impl<T: Real> Tape<'_, T> {
         let widths = parts
             .iter()
             .map(|&part| (part, self.rows_and_columns(part).1));
-        let parts_and_widths = widths.collect();
+        let widths = widths.collect();
         Ok(self.put("concat", parts, &shape, y, || Concat {
-            parts: parts_and_widths,
+            parts: widths,
             total,
         }))
     }
