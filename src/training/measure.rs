@@ -106,6 +106,8 @@ pub struct StepSpeed {
     /// What this one sent in a step, bytes, and how long it waited for others, s; means.
     pub bytes_sent: f64,
     pub seconds_waiting: f64,
+    /// Of a step: the sum of the shards' gradients and Adam, s; mean.
+    pub seconds_updating: f64,
     /// The fastest of the timed steps, s.
     pub seconds: f64,
     /// Frames predicted in forward, backward and update a second, at that.
@@ -125,7 +127,11 @@ impl fmt::Display for StepSpeed {
             write!(f, " on each of {} ranks", self.ranks)?;
         }
         let (seconds, rate) = (self.seconds, self.frame_steps_per_second);
-        write!(f, ": {seconds:.3} s, {rate:.0} frame-steps/s")?;
+        let updating = self.seconds_updating;
+        write!(
+            f,
+            ": {seconds:.3} s ({updating:.3} of it sum and Adam), {rate:.0} frame-steps/s"
+        )?;
         if self.ranks > 1 {
             let (sent, waiting) = (self.bytes_sent / 1e6, self.seconds_waiting);
             write!(f, "; rank 0 sends {sent:.1} MB and waits {waiting:.3} s")?;
@@ -158,6 +164,7 @@ pub fn step_speed(
         ranks: count,
         bytes_sent: traffic.bytes_sent as f64 / steps,
         seconds_waiting: traffic.seconds / steps,
+        seconds_updating: step.stepper.updating.as_secs_f64() / steps,
         seconds,
         frame_steps_per_second: (frames * batch) as f64 / seconds,
     })

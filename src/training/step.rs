@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -63,6 +64,8 @@ pub struct Stepper {
     /// One for each shard that a step has had on this rank, zero between steps.
     gradients: Vec<Gradients<f32>>,
     pub together: Together,
+    /// Time that the sum of the shards' gradients and Adam took, over all steps.
+    pub updating: Duration,
 }
 
 impl Stepper {
@@ -74,6 +77,7 @@ impl Stepper {
             workspaces: Mutex::new(Vec::new()),
             gradients: Vec::new(),
             together: Together::default(),
+            updating: Duration::ZERO,
         })
     }
 
@@ -159,12 +163,14 @@ impl Stepper {
         }
         let losses = self.own_losses(input, parameters, own);
         let sum = Losses::of_all(losses, parameters, &mut self.together)?;
+        let begun = Instant::now();
         let (pool, mut gradients) = (&self.pool, &mut self.gradients[..count]);
         if !self.together.is_alone() {
             self.together.sum(shards, gradients);
             gradients = &mut gradients[..1];
         }
         let norm = pool.install(|| adam.step_shards(parameters, gradients));
+        self.updating += begun.elapsed();
         match norm {
             Ok(norm) => {
                 take_up_buffers(parameters, &sum.buffers).map_err(|cause| failure(input, cause))?;
