@@ -33,6 +33,9 @@ pub enum AutogradError {
         operation: &'static str,
         what: &'static str,
     },
+    /// What a step is computed from is not to be had: why.
+    #[error("{0}")]
+    Input(String),
     /// The first operation whose result holds a NaN or an infinity.
     #[error(
         "{operation} (operation {index} of the step) made a {what} in its {place} of shape {shape:?} from inputs of shapes {inputs:?}"

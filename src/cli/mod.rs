@@ -17,6 +17,7 @@ mod music;
 mod notice;
 mod pack;
 mod plot;
+mod prepare;
 mod progress;
 mod regenerate;
 mod reproduce;
@@ -104,6 +105,8 @@ enum Command {
     Features(features::FeaturesArgs),
     #[command(after_help = include_str!("help/music.txt"))]
     Music(music::MusicArgs),
+    #[command(after_help = include_str!("help/prepare.txt"))]
+    Prepare(prepare::PrepareArgs),
     /// Write generated dance clips as BVH files
     #[command(after_help = include_str!("help/choreography.txt"))]
     Choreography(choreography::ChoreographyArgs),
@@ -155,6 +158,7 @@ impl Cli {
             Command::Runs(args) => runs::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Choreography(args) => choreography::run(args)?,
+            Command::Prepare(args) => prepare::run(args)?,
             Command::View(args) => view::run(args)?,
             Command::Plot(args) => plot::run(args)?,
             Command::Pack(args) => pack::run(args)?,

@@ -25,8 +25,8 @@ use crate::training::{Outcome, Resumed, Trainer};
 pub struct TrainArgs {
     /// Config of the experiment, TOML
     config: PathBuf,
-    /// Folder of BVH files
-    #[arg(long, value_name = "DIR")]
+    /// Folder of BVH files, or what prepare made of one
+    #[arg(long, value_name = "DATA")]
     data: PathBuf,
     /// Folder for the run: config, manifest, log, checkpoints, weights
     #[arg(long, value_name = "RUN_DIR")]
@@ -61,7 +61,10 @@ struct Loaded {
 impl Loaded {
     fn read(args: &TrainArgs) -> anyhow::Result<Self> {
         let config = ExperimentConfig::load_under(&args.config, args.budget.as_deref(), &args.set)?;
-        let dataset = Dataset::load(&args.data, &config.data)?;
+        let dataset = match config.model.reads_stored_clips() {
+            true => Dataset::load_to_train(&args.data, &config.data)?,
+            false => Dataset::load(&args.data, &config.data)?,
+        };
         warn(&dataset.warnings);
         let given = args.start.as_ref();
         let given = given.map(|run| RunFolder::open(run).newest_weights());

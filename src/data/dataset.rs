@@ -1,5 +1,6 @@
 //! Recordings as training, validation and test clips.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -21,7 +22,10 @@ use super::mixed;
 use super::motorica::load as motorica;
 #[cfg(feature = "music")]
 use super::pairs;
+use super::part::DataPart;
+use super::prepared::{self, Stored, StoredClip};
 use super::reading::{FileReading, grouped};
+use super::source::ClipSource;
 use super::split::{Parts, check_dance_frames, check_frames, lafan1_warning, split};
 use super::twins::twins;
 use crate::motion::bvh::{self, BvhError};
@@ -46,9 +50,11 @@ pub struct Recording {
 pub type NamedFrames = BTreeMap<String, Vec<Range<usize>>>;
 
 /// A data set, split.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Dataset {
     pub train: Vec<Recording>,
+    /// Clips that stay in a prepared set, in place of `train` and `test`.
+    pub stored: Stored,
     /// Cut from the training clips; empty unless the config asks for it.
     pub validation: Vec<Recording>,
     pub test: Vec<Recording>,
@@ -141,6 +147,14 @@ pub enum DataError {
     Unread,
     #[error("{path} is not what it should be: {problem}")]
     Listed { path: PathBuf, problem: String },
+    #[error("{path} cannot be taken for data: {problem}")]
+    Prepared { path: PathBuf, problem: String },
+    #[error("{path} cannot be written")]
+    Written {
+        path: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
     #[cfg(feature = "music")]
     #[error(transparent)]
     Music(#[from] crate::music::MusicError),
@@ -202,6 +216,11 @@ impl Recording {
         &self.clip.name
     }
 
+    /// Its motion, to train on.
+    pub fn source(&self) -> ClipSource<'_> {
+        ClipSource::Held(Cow::Borrowed(&self.clip))
+    }
+
     /// Number of frames.
     pub fn frames(&self) -> usize {
         self.clip.poses.len()
@@ -209,11 +228,15 @@ impl Recording {
 }
 
 impl Dataset {
-    /// Reads the BVH files that lie in a folder (not those in folders inside it) and splits them.
+    /// Reads the BVH files that lie in a folder (not those in folders inside it), or a prepared set
+    /// of them, and splits them.
     ///
     /// # Errors
     /// The folder has no BVH file, a file is bad, or the config does not fit what is there.
     pub fn load(folder: &Path, config: &DataConfig) -> Result<Self, DataError> {
+        if folder.is_file() {
+            return prepared::load(folder, config, false);
+        }
         match config.split {
             Split::Motorica => return motorica(folder, config),
             Split::Mixed => return mixed::load(folder, config),
@@ -231,9 +254,39 @@ impl Dataset {
             hear(read_clip(&files[name], name, mapping, config)?)
         })?;
         dataset.named_frames = listed::named_frames(folder, config.fps)?;
-        dataset.warnings.extend(twins(&dataset)?);
+        dataset.warnings.extend(dataset.twins()?);
         dataset.warnings.extend(left_out(folder));
         Ok(dataset)
+    }
+
+    /// The same to train on alone: of a prepared set the training clips stay in the file.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn load_to_train(path: &Path, config: &DataConfig) -> Result<Self, DataError> {
+        match path.is_file() {
+            true => prepared::load(path, config, true),
+            false => Self::load(path, config),
+        }
+    }
+
+    /// Clips and frames of a part, wherever they are.
+    pub fn size(&self, part: DataPart) -> (usize, usize) {
+        let (held, stored) = match part {
+            DataPart::Train => (&self.train, &self.stored.train[..]),
+            DataPart::Validation => (&self.validation, &[][..]),
+            DataPart::Test => (&self.test, &self.stored.test[..]),
+        };
+        let frames = held.iter().map(Recording::frames);
+        let frames = frames.chain(stored.iter().map(StoredClip::frames));
+        (held.len() + stored.len(), frames.sum())
+    }
+
+    /// The clips to train on, wherever they are.
+    pub fn training_clips(&self) -> Vec<ClipSource<'_>> {
+        let held = self.train.iter().map(Recording::source);
+        held.chain(self.stored.train.iter().map(ClipSource::Stored))
+            .collect()
     }
 
     /// The [digest](Dataset::digest) of all clips in a folder; none where they cannot be read.
@@ -272,7 +325,7 @@ impl Dataset {
 
     /// The parts of the split, each clip with the digest of what it was made from as `read` gives
     /// them.
-    fn assemble(
+    pub(super) fn assemble(
         names: &[String],
         origin: &str,
         config: &DataConfig,
@@ -300,18 +353,60 @@ impl Dataset {
         let digest = digest(all().map(|clip| (clip.recording.name(), &*clip.digest)));
         let warnings = grouped(all().map(|clip| (clip.recording.name(), &clip.notices[..])));
         let clips = |part: Vec<ReadClip>| part.into_iter().map(|clip| clip.recording).collect();
-        let mut dataset = Self {
+        let dataset = Self {
             train: clips(train),
             validation: clips(validation),
             test: clips(test),
             digest,
-            named_frames: BTreeMap::new(),
             warnings,
+            ..Self::default()
         };
-        check_frames(&dataset, origin, config)?;
-        check_dance_frames(&dataset, origin, config)?;
-        dataset.warnings.extend(lafan1_warning(&dataset, config));
-        Ok(dataset)
+        dataset.with_sizes_checked(origin, config)
+    }
+
+    /// Checked where the config's split says how large its parts are.
+    fn with_sizes_checked(mut self, origin: &str, config: &DataConfig) -> Result<Self, DataError> {
+        check_frames(&self, origin, config)?;
+        check_dance_frames(&self, origin, config)?;
+        self.warnings.extend(lafan1_warning(&self, config));
+        Ok(self)
+    }
+
+    /// The same of clips that lie in a prepared set, to train on: the training clips stay there,
+    /// the validation clips are read, those that test only counted and looked at for twins.
+    pub(super) fn assemble_stored(
+        clips: &BTreeMap<String, StoredClip>,
+        origin: &str,
+        config: &DataConfig,
+    ) -> Result<Self, DataError> {
+        let names: Vec<String> = clips.keys().cloned().collect();
+        let parts = split(&names, origin, config)?;
+        let of = |names: &Vec<String>| -> Vec<StoredClip> {
+            names.iter().map(|name| clips[name].clone()).collect()
+        };
+        let [train, validation, test] = [&parts.train, &parts.validation, &parts.test].map(of);
+        let known = train.iter().chain(&validation).map(ClipSource::Stored);
+        let warnings = twins(known, test.iter().map(ClipSource::Stored))?;
+        let all = || train.iter().chain(&validation).chain(&test);
+        let digest = digest(all().map(|clip| (clip.name(), clip.source_digest())));
+        let validation = validation.iter().map(|it| Ok(Recording::of(it.whole()?)));
+        let dataset = Self {
+            validation: validation.collect::<Result<_, DataError>>()?,
+            stored: Stored { train, test },
+            digest,
+            warnings,
+            ..Self::default()
+        };
+        dataset.with_sizes_checked(origin, config)
+    }
+
+    /// Warnings about clips that are the same motion, see [`twins`].
+    pub(super) fn twins(&self) -> Result<Vec<String>, DataError> {
+        let known = self.train.iter().chain(&self.validation);
+        twins(
+            known.map(Recording::source),
+            self.test.iter().map(Recording::source),
+        )
     }
 }
 
@@ -361,15 +456,15 @@ fn hearing(
 }
 
 /// A clip that was read.
-struct ReadClip {
-    recording: Recording,
+pub(super) struct ReadClip {
+    pub recording: Recording,
     /// SHA-256 of what it was made from, hexadecimal.
-    digest: String,
-    notices: Vec<String>,
+    pub digest: String,
+    pub notices: Vec<String>,
 }
 
 /// Reads a file; `name` is the clip's.
-fn read_clip(
+pub(super) fn read_clip(
     path: &Path,
     name: &str,
     mapping: Option<&Mapping>,

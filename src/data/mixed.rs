@@ -26,14 +26,7 @@ pub(super) fn load(folder: &Path, config: &DataConfig) -> Result<Dataset, DataEr
             found: "holds no folder, each of which would be a data set".into(),
         });
     }
-    let mut mixed = Dataset {
-        train: Vec::new(),
-        validation: Vec::new(),
-        test: Vec::new(),
-        digest: String::new(),
-        named_frames: BTreeMap::new(),
-        warnings: Vec::new(),
-    };
+    let mut mixed = Dataset::default();
     let mut digests = BTreeMap::new();
     for path in folders {
         let mut set = Dataset::load(&path, &own_config(&path, config))?;

@@ -13,7 +13,9 @@ pub mod motorica;
 #[cfg(feature = "music")]
 mod pairs;
 mod part;
+mod prepared;
 mod reading;
+mod source;
 mod split;
 mod twins;
 mod windows;
@@ -29,5 +31,7 @@ pub use pairs::music_beside;
 #[cfg(feature = "papers")]
 pub(crate) use pairs::{sound_files, sound_of};
 pub use part::{DataPart, EmptyPart};
+pub use prepared::{Prepared, Stored, StoredClip, prepare};
 pub use reading::{FileReading, RigReading, at_its_rate};
+pub use source::ClipSource;
 pub use windows::{Window, WindowCut};

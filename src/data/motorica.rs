@@ -122,8 +122,7 @@ pub(super) fn load(folder: &Path, config: &DataConfig) -> Result<Dataset, DataEr
         validation: part(DataPart::Validation)?,
         test: part(DataPart::Test)?,
         digest: motorica.digest.clone(),
-        named_frames: BTreeMap::new(),
-        warnings: Vec::new(),
+        ..Dataset::default()
     };
     let origin = format!("the data folder {}", folder.display());
     check_frames(&dataset, &origin, config)?;

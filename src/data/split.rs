@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 
 use super::config::{DataConfig, Split};
-use super::dataset::{DataError, Dataset, Recording};
+use super::dataset::{DataError, Dataset};
+use super::part::DataPart;
 use crate::counted::counted;
 
 /// What the paper's split must hold: clips and frames for training, clips and frames for testing.
@@ -187,9 +188,8 @@ fn floor(number: f64) -> usize {
 /// What is to be known of a part of LaFAN1: how much of it is there.
 pub(super) fn lafan1_warning(dataset: &Dataset, config: &DataConfig) -> Option<String> {
     let (train, test, frames) = LAFAN1;
-    let clips = || dataset.train.iter().chain(&dataset.validation);
-    let (train_found, test_found) = (clips().count(), dataset.test.len());
-    let found = clips().chain(&dataset.test).map(Recording::frames).sum();
+    let [(train_found, known), (test_found, tested)] = known_and_tested(dataset);
+    let found = known + tested;
     let whole = (train_found, test_found, found) == (train, test, frames);
     (config.split == Split::Lafan1 && !whole).then(|| {
         format!(
@@ -217,11 +217,8 @@ pub(super) fn check_frames(
         Split::Motorica => ("motorica", MOTORICA),
         _ => return Ok(()),
     };
-    let parts = [&dataset.train, &dataset.validation, &dataset.test];
-    let found = parts.map(|clips| {
-        let frames = clips.iter().map(Recording::frames);
-        (clips.len(), frames.sum::<usize>())
-    });
+    let parts = [DataPart::Train, DataPart::Validation, DataPart::Test];
+    let found = parts.map(|part| dataset.size(part));
     if found == expected {
         return Ok(());
     }
@@ -248,11 +245,8 @@ pub(super) fn check_dance_frames(
     origin: &str,
     config: &DataConfig,
 ) -> Result<(), DataError> {
-    let frames = |clips: &[Recording]| clips.iter().map(Recording::frames).sum::<usize>();
-    let found = (
-        frames(&dataset.train) + frames(&dataset.validation),
-        frames(&dataset.test),
-    );
+    let [(_, known), (_, tested)] = known_and_tested(dataset);
+    let found = (known, tested);
     let expected = (DANCE_TRAIN.1, DANCE_TEST.1);
     if config.split == Split::Dance && found != expected {
         return Err(DataError::Split {
@@ -268,4 +262,11 @@ pub(super) fn check_dance_frames(
         });
     }
     Ok(())
+}
+
+/// Clips and frames that train or validate, and that test.
+fn known_and_tested(dataset: &Dataset) -> [(usize, usize); 2] {
+    let [train, validation, test] =
+        [DataPart::Train, DataPart::Validation, DataPart::Test].map(|part| dataset.size(part));
+    [(train.0 + validation.0, train.1 + validation.1), test]
 }

@@ -2,24 +2,33 @@
 
 use glam::{DQuat, DVec3};
 
-use super::dataset::{DataError, Dataset, Recording};
-use crate::motion::{Clip, Pose};
+use super::dataset::DataError;
+use super::source::ClipSource;
+use crate::motion::Pose;
 
 /// Roots and rotations of the same motion, written by different programs, are this close, cm and 1.
 const SAME: f64 = 1e-3;
 
-/// Warnings about clips that are the same motion.
+/// Warnings about clips that are the same motion: `known` are those that train or validate.
 ///
 /// # Errors
-/// One trains or validates and the other tests: scores would be those of what is known by heart.
-pub(super) fn twins(dataset: &Dataset) -> Result<Vec<String>, DataError> {
-    let known = || dataset.train.iter().chain(&dataset.validation);
-    let mut clips: Vec<(&Recording, bool)> = known().map(|clip| (clip, false)).collect();
-    clips.extend(dataset.test.iter().map(|clip| (clip, true)));
+/// One is known and the other tests: scores would be those of what is known by heart. Clips cannot
+/// be read.
+pub(super) fn twins<'c>(
+    known: impl IntoIterator<Item = ClipSource<'c>>,
+    tested: impl IntoIterator<Item = ClipSource<'c>>,
+) -> Result<Vec<String>, DataError> {
+    let known = known.into_iter().map(|clip| (clip, false));
+    let clips = known.chain(tested.into_iter().map(|clip| (clip, true)));
+    let clips = clips.map(|(clip, tests)| {
+        let first = clip.poses(0..clip.frames().min(1))?.into_owned();
+        Ok((clip, first, tests))
+    });
+    let clips: Vec<(ClipSource<'_>, Vec<Pose>, bool)> = clips.collect::<Result<_, DataError>>()?;
     let mut warnings = Vec::new();
-    for (index, (clip, tests)) in clips.iter().enumerate() {
-        for (before, before_tests) in &clips[..index] {
-            if !is_same(&before.clip, &clip.clip) {
+    for (index, (clip, first, tests)) in clips.iter().enumerate() {
+        for (before, first_before, before_tests) in &clips[..index] {
+            if !are_close(first_before, first) || !is_same(before, clip)? {
                 continue;
             }
             let [first, second] = [before, clip].map(|clip| clip.name().to_string());
@@ -35,7 +44,7 @@ pub(super) fn twins(dataset: &Dataset) -> Result<Vec<String>, DataError> {
     Ok(warnings)
 }
 
-fn is_same(a: &Clip, b: &Clip) -> bool {
+fn are_close(a: &[Pose], b: &[Pose]) -> bool {
     let close = |a: &Pose, b: &Pose| {
         let roots = a.translations.first().zip(b.translations.first());
         let rotations = a.rotations.iter().zip(&b.rotations);
@@ -44,8 +53,12 @@ fn is_same(a: &Clip, b: &Clip) -> bool {
                 .clone()
                 .all(|(a, b): (&DQuat, &DQuat)| a.dot(*b).abs() >= 1.0 - SAME * SAME)
     };
-    let frames = a.poses.iter().zip(&b.poses);
-    a.poses.len() == b.poses.len()
-        && a.skeleton.len() == b.skeleton.len()
-        && frames.clone().all(|(a, b)| close(a, b))
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| close(a, b))
+}
+
+fn is_same(a: &ClipSource<'_>, b: &ClipSource<'_>) -> Result<bool, DataError> {
+    let frames = a.frames();
+    Ok(frames == b.frames()
+        && a.skeleton().len() == b.skeleton().len()
+        && are_close(&a.poses(0..frames)?, &b.poses(0..frames)?))
 }

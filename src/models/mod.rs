@@ -20,6 +20,8 @@ pub mod duan2022;
 pub mod exported_batch;
 #[cfg(feature = "papers")]
 pub mod flow;
+#[cfg(feature = "papers")]
+mod forms;
 pub mod generator;
 pub mod gradient_report;
 #[cfg(feature = "papers")]

@@ -114,6 +114,12 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
         Err(without_weights(self.kind()))
     }
 
+    /// Whether its task reads windows of clips that stay in a prepared set, see
+    /// [`Dataset::load_to_train`]; the others' clips are in memory.
+    fn reads_stored_clips(&self) -> bool {
+        false
+    }
+
     /// Steps to time: each `batch` windows of `frames` frames, made up.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::clip::Clip;
 use super::contact::{FOOT_JOINTS, contacts};
 use super::facing::{FacingJoints, facing_angles};
+use super::skeleton::Skeleton;
 use super::velocity_factor::velocity_factors;
 
 /// p^b: positions of the 23 joints relative to the root, turned to face +Z, cm.
@@ -88,14 +89,27 @@ pub enum FeatureError {
 /// # Errors
 /// The clip is on another skeleton or has no frames; a setting is not a positive number.
 pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, FeatureError> {
-    check(clip, config)?;
+    config.check(&clip.name, &clip.skeleton, clip.poses.len())?;
     let world = clip.skeleton.world_positions(&clip.poses);
     let facing = facing_angles(&world, &FacingJoints::DANCE, config.facing_sigma);
-    let contacts = contacts(&world, FOOT_JOINTS, config.contact_threshold);
+    Ok(features_facing(&world, &facing, config.contact_threshold))
+}
+
+/// Features of frames in a row whose facing angles (rad) are known, `[frames, 154]`, not
+/// standardised; the first has the labels of the second and velocity 0.
+///
+/// `world`: world positions of the 24 joints, `[frames][24]`, cm; `contact_threshold` as in
+/// [`FeatureConfig`].
+pub fn features_facing(
+    world: &[Vec<DVec3>],
+    facing: &[f64],
+    contact_threshold: f64,
+) -> Array2<f64> {
+    let contacts = contacts(world, FOOT_JOINTS, contact_threshold);
     let mut features = Array2::zeros((world.len(), FEATURES));
-    for (time, positions) in world.iter().enumerate() {
+    for (time, (positions, &facing)) in world.iter().zip(facing).enumerate() {
         let mut frame = features.row_mut(time);
-        write_positions(&mut frame, positions, facing[time]);
+        write_positions(&mut frame, positions, facing);
         for (slot, label) in CONTACTS.zip(contacts[time]) {
             frame[slot] = label;
         }
@@ -108,7 +122,7 @@ pub fn features(clip: &Clip, config: &FeatureConfig) -> Result<Array2<f64>, Feat
             features[[time, slot]] = factor;
         }
     }
-    Ok(features)
+    features
 }
 
 /// Writes p^b = R_y(-o^r) (p - p^r), p^r and o^r of one frame, from the world positions of its 24
@@ -143,34 +157,43 @@ pub fn write_velocities(rows: &mut Array2<f64>) {
     }
 }
 
-fn check(clip: &Clip, config: &FeatureConfig) -> Result<(), FeatureError> {
-    if let Some((index, expected, found)) = clip.skeleton.difference_from_dance() {
-        return Err(FeatureError::NotTheDanceSkeleton {
-            clip: clip.name.clone(),
-            index,
-            expected,
-            found,
-        });
+impl FeatureConfig {
+    /// Refuses what has no features: `clip` is its name, `frames` how many it has.
+    ///
+    /// # Errors
+    /// As [`features`].
+    pub fn check(
+        &self,
+        clip: &str,
+        skeleton: &Skeleton,
+        frames: usize,
+    ) -> Result<(), FeatureError> {
+        if let Some((index, expected, found)) = skeleton.difference_from_dance() {
+            return Err(FeatureError::NotTheDanceSkeleton {
+                clip: clip.into(),
+                index,
+                expected,
+                found,
+            });
+        }
+        if frames == 0 {
+            return Err(FeatureError::NoFrames { clip: clip.into() });
+        }
+        let (threshold, sigma) = (self.contact_threshold, self.facing_sigma);
+        let fault = |key, value, expected| {
+            Err(FeatureError::Config {
+                key,
+                value,
+                expected,
+            })
+        };
+        if !(threshold > 0.0 && threshold.is_finite()) {
+            return fault("contact_threshold", threshold, "a positive number");
+        }
+        if !(sigma > 0.0 && sigma <= LONGEST_SIGMA) {
+            let expected = "a number of frames above 0 and at most 10000";
+            return fault("facing_sigma", sigma, expected);
+        }
+        Ok(())
     }
-    if clip.poses.is_empty() {
-        return Err(FeatureError::NoFrames {
-            clip: clip.name.clone(),
-        });
-    }
-    let (threshold, sigma) = (config.contact_threshold, config.facing_sigma);
-    let fault = |key, value, expected| {
-        Err(FeatureError::Config {
-            key,
-            value,
-            expected,
-        })
-    };
-    if !(threshold > 0.0 && threshold.is_finite()) {
-        return fault("contact_threshold", threshold, "a positive number");
-    }
-    if !(sigma > 0.0 && sigma <= LONGEST_SIGMA) {
-        let expected = "a number of frames above 0 and at most 10000";
-        return fault("facing_sigma", sigma, expected);
-    }
-    Ok(())
 }

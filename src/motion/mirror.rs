@@ -8,33 +8,47 @@ use super::skeleton::{Joint, Skeleton};
 /// A clip on the dance skeleton as it is seen in a mirror in the plane X = 0, the skeleton and what
 /// the joints are called included: LeftHand of the image moves as RightHand of the clip does.
 pub fn mirror_image(clip: &Clip) -> Clip {
-    let partners: Vec<usize> = (0..clip.skeleton.len())
-        .map(|joint| partner(&clip.skeleton, joint))
-        .collect();
-    let joints = clip.skeleton.joints.iter().zip(&partners);
+    let partners = partners(&clip.skeleton);
     Clip {
         name: clip.name.clone(),
-        skeleton: Skeleton {
-            joints: joints
-                .map(|(joint, &partner)| reflected_joint(joint, &clip.skeleton.joints[partner]))
-                .collect(),
-        },
+        skeleton: mirrored_skeleton(&partners, &clip.skeleton),
         frame_time: clip.frame_time,
-        poses: clip
-            .poses
-            .iter()
-            .map(|pose| Pose {
-                translations: partners
-                    .iter()
-                    .map(|&partner| reflected(pose.translations[partner]))
-                    .collect(),
-                rotations: partners
-                    .iter()
-                    .map(|&partner| reflected_rotation(pose.rotations[partner]))
-                    .collect(),
-            })
+        poses: mirrored_poses(&partners, &clip.poses),
+    }
+}
+
+/// The skeleton of a clip's [`mirror_image`]; `partners` are those of its own.
+pub fn mirrored_skeleton(partners: &[usize], skeleton: &Skeleton) -> Skeleton {
+    let joints = skeleton.joints.iter().zip(partners);
+    Skeleton {
+        joints: joints
+            .map(|(joint, &partner)| reflected_joint(joint, &skeleton.joints[partner]))
             .collect(),
     }
+}
+
+/// The joint on the body's other side of each joint, `[joints]`; one in the middle is its own.
+pub fn partners(skeleton: &Skeleton) -> Vec<usize> {
+    (0..skeleton.len())
+        .map(|joint| partner(skeleton, joint))
+        .collect()
+}
+
+/// The poses of a clip's [`mirror_image`], `[frames]`; `partners` are those of its skeleton.
+pub fn mirrored_poses(partners: &[usize], poses: &[Pose]) -> Vec<Pose> {
+    poses
+        .iter()
+        .map(|pose| Pose {
+            translations: partners
+                .iter()
+                .map(|&partner| reflected(pose.translations[partner]))
+                .collect(),
+            rotations: partners
+                .iter()
+                .map(|&partner| reflected_rotation(pose.rotations[partner]))
+                .collect(),
+        })
+        .collect()
 }
 
 /// The joint on the body's other side; one in the middle is its own partner.

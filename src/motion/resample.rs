@@ -1,5 +1,7 @@
 //! Clips at another frame rate.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 use super::clip::{Clip, Pose};
@@ -61,33 +63,99 @@ pub fn resample(clip: Clip, fps: f64) -> Result<Clip, ResampleError> {
 /// # Errors
 /// As [`resample`].
 pub(super) fn at_step(clip: Clip, step: f64, fps: f64) -> Result<Clip, ResampleError> {
-    if step * FINEST < 1.0 {
-        return Err(ResampleError::TooCoarse {
-            clip: clip.name,
-            frame_time: clip.frame_time,
-            fps,
-        });
-    }
-    if step == 1.0 || clip.poses.is_empty() {
+    let frames = Resampled::new((&clip.name, clip.frame_time), clip.poses.len(), step, fps)?;
+    if step == 1.0 {
         return Ok(clip);
     }
-    let last = clip.poses.len() - 1;
-    let frames = (last as f64 / step + 1e-9).floor() as usize + 1;
-    if step < 1.0 && frames > MOST_FRAMES {
-        return Err(ResampleError::TooLong {
-            clip: clip.name,
-            frames,
-            fps,
-        });
-    }
-    let poses = (0..frames)
-        .map(|frame| pose_at(&clip.poses, frame as f64 * step))
-        .collect();
     Ok(Clip {
         frame_time: 1.0 / fps,
-        poses,
+        poses: frames.poses(0..frames.len(), &clip.poses),
         ..clip
     })
+}
+
+/// The frames of a resampled clip, one range of them at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resampled {
+    /// Old frames from one new frame to the next.
+    step: f64,
+    /// Old frames.
+    old: usize,
+    /// New frames.
+    len: usize,
+}
+
+impl Resampled {
+    /// Those of a clip of `old` frames, given its name and frame time.
+    pub(super) fn new(
+        (name, frame_time): (&str, f64),
+        old: usize,
+        step: f64,
+        fps: f64,
+    ) -> Result<Self, ResampleError> {
+        if step * FINEST < 1.0 {
+            return Err(ResampleError::TooCoarse {
+                clip: name.into(),
+                frame_time,
+                fps,
+            });
+        }
+        let Some(last) = old.checked_sub(1).filter(|_| step != 1.0) else {
+            return Ok(Self {
+                step,
+                old,
+                len: old,
+            });
+        };
+        let len = (last as f64 / step + 1e-9).floor() as usize + 1;
+        if step < 1.0 && len > MOST_FRAMES {
+            return Err(ResampleError::TooLong {
+                clip: name.into(),
+                frames: len,
+                fps,
+            });
+        }
+        Ok(Self { step, old, len })
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The old frames that new ones lie between; `frames` are not beyond the last.
+    pub fn between(&self, frames: Range<usize>) -> Range<usize> {
+        let old = |frame: usize| ((frame as f64 * self.step) as usize).min(self.old - 1);
+        match frames.is_empty() {
+            true => 0..0,
+            false => old(frames.start)..(old(frames.end - 1) + 2).min(self.old),
+        }
+    }
+
+    /// The new frames; `old` are the poses that they lie [between](Resampled::between).
+    pub fn poses(&self, frames: Range<usize>, old: &[Pose]) -> Vec<Pose> {
+        let first = self.between(frames.clone()).start;
+        let pose = |frame| self.pose_at(old, first, frame as f64 * self.step);
+        frames.map(pose).collect()
+    }
+
+    /// The pose at a time counted in old frames, `poses` beginning with the frame `first`; times
+    /// beyond the last frame have its pose.
+    fn pose_at(&self, poses: &[Pose], first: usize, time: f64) -> Pose {
+        let last = self.old - 1;
+        let before = (time as usize).min(last);
+        let share = time - before as f64;
+        let from = &poses[before - first];
+        if share < 1e-9 || before == last {
+            return from.clone();
+        }
+        from.towards(&poses[before + 1 - first], share)
+    }
 }
 
 /// A rate or a ratio of rates, without the rounding of frame times.
@@ -102,17 +170,4 @@ fn whole(ratio: f64) -> f64 {
     } else {
         ratio
     }
-}
-
-/// The pose at a time counted in frames; times beyond the last frame have its pose.
-fn pose_at(poses: &[Pose], time: f64) -> Pose {
-    let last = poses.len() - 1;
-    let before = (time as usize).min(last);
-    let after = (before + 1).min(last);
-    let share = time - before as f64;
-    let (from, to) = (&poses[before], &poses[after]);
-    if share < 1e-9 || before == last {
-        return from.clone();
-    }
-    from.towards(to, share)
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::autograd::kernels::Isa;
-use crate::data::{Dataset, Recording};
+use crate::data::{DataPart, Dataset};
 use crate::experiment::ExperimentConfig;
 use crate::models::Task;
 
@@ -109,11 +109,9 @@ pub struct Part {
 }
 
 impl Part {
-    fn of(clips: &[Recording]) -> Self {
-        Self {
-            clips: clips.len(),
-            frames: clips.iter().map(Recording::frames).sum(),
-        }
+    fn of(dataset: &Dataset, part: DataPart) -> Self {
+        let (clips, frames) = dataset.size(part);
+        Self { clips, frames }
     }
 }
 
@@ -150,8 +148,8 @@ impl Manifest {
             steps: task.steps(),
             frame_steps_done: 0,
             frame_steps: task.frame_steps(),
-            train: Part::of(&dataset.train),
-            test: Part::of(&dataset.test),
+            train: Part::of(dataset, DataPart::Train),
+            test: Part::of(dataset, DataPart::Test),
             data_digest: dataset.digest.clone(),
             parameters,
             weights_digest: None,

@@ -36,6 +36,7 @@ mod music;
 mod odd_files;
 mod outputs;
 mod passed_on;
+mod prepare;
 mod report;
 mod reproduce;
 mod rig;

@@ -28,6 +28,7 @@ mod ik;
 mod learning_rate;
 mod mapping;
 mod music;
+mod prepared;
 mod resample;
 mod rig;
 mod root_reconstruction;

@@ -37,6 +37,7 @@ mod metrics;
 mod music_dance;
 mod pan2021;
 mod preferred;
+mod prepared_training;
 mod prior;
 mod pu2022;
 mod published;

@@ -6,7 +6,7 @@ use keydance::data::{Dataset, Recording};
 use keydance::experiment::ExperimentConfig;
 use keydance::models::settings::InitialRng;
 use keydance::models::transition::{
-    Batch, DanceClip, Forcing, Network, Schedule, TransitionSettings, TransitionTask,
+    Batch, Forcing, Network, Schedule, TransitionSettings, TransitionTask,
 };
 use keydance::models::{LossTerms, Streams};
 use keydance::motion::features::{FEATURES, FRAME};
@@ -128,11 +128,9 @@ pub fn dataset() -> Dataset {
     let test = recordings.split_off(3);
     Dataset {
         train: recordings,
-        validation: Vec::new(),
         test,
         digest: "synthetic".into(),
-        named_frames: Default::default(),
-        warnings: Vec::new(),
+        ..Dataset::default()
     }
 }
 
@@ -189,7 +187,7 @@ pub fn trainer_of_network<'d>(
 ) -> Result<Trainer<'d>, TrainingError> {
     let own = TransitionSettings::of(&config).unwrap().clone();
     Trainer::with_task(config, data, threads, |setting, init| {
-        let clips = DanceClip::measure_all(&data.train, &setting.data.features()).unwrap();
+        let clips = setting.dataset.training_clips();
         let task = TransitionTask::new(&own, setting, clips, |_| Ok(build(init)))?;
         Ok(Box::new(task))
     })

@@ -1,5 +1,7 @@
 //! Training clips with their music, and the windows that are drawn of them (spec, section 6).
 
+use std::borrow::Cow;
+
 use ndarray::{Array1, Array2, Axis, s};
 use rand::RngExt as _;
 use rand::seq::index;
@@ -10,7 +12,8 @@ use super::window::WindowFrame;
 use crate::data::Recording;
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
-use crate::motion::{Clip, mirror_image};
+use crate::motion::mirror::{mirrored_poses, mirrored_skeleton, partners};
+use crate::motion::{Clip, Skeleton};
 use crate::music::FeatureSet;
 
 /// Columns that do not vary are not divided by their deviation.
@@ -61,10 +64,18 @@ impl MusicStatistics {
 #[derive(Debug, Clone)]
 pub struct TrainingClip {
     clip: Clip,
-    mirrored: Option<Clip>,
+    mirrored: Option<Mirrored>,
     facing: FacingJoints,
     /// Standardised, `[frames, numbers]`.
     music: Array2<f64>,
+}
+
+/// What makes windows in the mirror.
+#[derive(Debug, Clone)]
+struct Mirrored {
+    skeleton: Skeleton,
+    /// The joint on the body's other side of each.
+    partners: Vec<usize>,
 }
 
 /// A window and what was recorded of its generated frames, `[T - T', 6 J + 3]`.
@@ -98,7 +109,13 @@ impl TrainingClip {
             reason: format!("{}: {error}", clip.name),
         })?;
         Ok(Self {
-            mirrored: mirror.then(|| mirror_image(&clip)),
+            mirrored: mirror.then(|| {
+                let partners = partners(&clip.skeleton);
+                Mirrored {
+                    skeleton: mirrored_skeleton(&partners, &clip.skeleton),
+                    partners,
+                }
+            }),
             clip,
             facing,
             music,
@@ -121,12 +138,14 @@ impl TrainingClip {
         mirrored: bool,
         window: &WindowConfig,
     ) -> RecordedWindow {
-        let clip = match (&self.mirrored, mirrored) {
-            (Some(mirrored), true) => mirrored,
-            _ => &self.clip,
+        let poses = &self.clip.poses[start..start + window.length];
+        let (skeleton, poses) = match &self.mirrored {
+            Some(Mirrored { skeleton, partners }) if mirrored => {
+                (skeleton, Cow::Owned(mirrored_poses(partners, poses)))
+            }
+            _ => (&self.clip.skeleton, Cow::Borrowed(poses)),
         };
-        let poses = &clip.poses[start..start + window.length];
-        let frame = WindowFrame::of(&clip.skeleton, &self.facing, &poses[window.seed - 1]);
+        let frame = WindowFrame::of(skeleton, &self.facing, &poses[window.seed - 1]);
         let rows: Vec<Vec<f64>> = poses.iter().map(|pose| frame.numbers(pose)).collect();
         let table = |rows: &[Vec<f64>]| {
             let columns = rows.first().map_or(0, Vec::len);

@@ -1,16 +1,20 @@
 //! Clips as they are trained: with the foot in contact of every frame, as recorded, in the mirror,
 //! at other tempi.
 
+use std::ops::Range;
+
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{GivenWindow, WindowTruth};
-use crate::data::Recording;
+use crate::data::ClipSource;
+use crate::models::forms::{ClipForm, forms};
 use crate::models::transition::{RootFrame, Window};
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
-use crate::motion::{Clip, ContactRule, Feet, Foot, Pose, at_tempo, mirror_image};
+use crate::motion::mirror::{mirrored_skeleton, partners};
+use crate::motion::{Clip, ContactRule, Feet, Foot, Pose, Skeleton};
 
 /// What is trained beside the recorded windows; the papers train nothing else.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -93,68 +97,105 @@ impl TrainingClip {
     }
 }
 
-/// All forms in which clips are trained: `[form][clip]`, the recorded ones first.
-pub(super) struct Forms {
-    forms: Vec<Vec<TrainingClip>>,
+/// All forms in which clips are trained, their windows made when they are asked for; the labels of
+/// all frames are in memory.
+pub(super) struct Forms<'d> {
+    recorded: Vec<RecordedClip<'d>>,
+    /// `[form][clip]`, the recorded ones first.
+    forms: Vec<Vec<LabelledForm>>,
     mirror: bool,
 }
 
-impl Forms {
+struct RecordedClip<'d> {
+    clip: ClipSource<'d>,
+    facing: FacingJoints,
+    /// The joint on the body's other side of each.
+    partners: Vec<usize>,
+    /// The skeleton in the mirror.
+    mirrored: Skeleton,
+}
+
+struct LabelledForm {
+    form: ClipForm,
+    /// The foot in contact, `[frames]`.
+    contacts: Vec<Foot>,
+}
+
+impl<'d> Forms<'d> {
     /// # Errors
-    /// A clip that cannot be labelled, or brought to a tempo.
+    /// A clip that cannot be labelled, brought to a tempo or read.
     pub fn of(
-        recordings: &[Recording],
+        clips: Vec<ClipSource<'d>>,
         augmentation: &AugmentationConfig,
         rule: ContactRule,
         threshold: f64,
         streams: Streams,
     ) -> Result<Self, ModelError> {
-        let tempi = [1.0].into_iter().chain(augmentation.tempi.iter().copied());
-        let sides = [false, true]
-            .into_iter()
-            .take(1 + usize::from(augmentation.mirror));
-        let forms: Vec<(f64, bool)> = tempi
-            .flat_map(|tempo| sides.clone().map(move |mirrored| (tempo, mirrored)))
-            .collect();
-        let form = |(form, &(tempo, mirrored)): (usize, &(f64, bool))| {
-            let clip = |(index, recording): (usize, &Recording)| {
-                let mut clip = recording.clip.clone();
-                if tempo != 1.0 {
-                    clip = at_tempo(clip, tempo).map_err(|error| ModelError::data(&error))?;
-                }
-                if mirrored {
-                    clip = mirror_image(&clip);
-                }
-                let stream = streams.stream("contact_foot", &[form as u64, index as u64]);
-                TrainingClip::new(clip, rule, threshold, stream)
-            };
-            let clips: Vec<_> = recordings.par_iter().enumerate().map(clip).collect();
-            clips.into_iter().collect::<Result<Vec<_>, _>>()
+        let recorded = clips.into_iter().map(RecordedClip::new);
+        let recorded: Vec<RecordedClip<'d>> = recorded.collect::<Result<_, _>>()?;
+        let all = forms(augmentation.mirror, &augmentation.tempi);
+        let labelled = |(index, recorded): (usize, &RecordedClip<'d>)| {
+            let whole = recorded.clip.whole();
+            let held = ClipSource::Held(whole.map_err(|error| ModelError::data(&error))?);
+            let labelled = all.iter().enumerate().map(|(number, &form)| {
+                let form = ClipForm::new(&held, form).map_err(|error| ModelError::data(&error))?;
+                let clip = recorded.in_form(&held, &form, 0..form.frames())?;
+                let stream = streams.stream("contact_foot", &[number as u64, index as u64]);
+                let TrainingClip { contacts, .. } =
+                    TrainingClip::new(clip, rule, threshold, stream)?;
+                Ok(LabelledForm { form, contacts })
+            });
+            labelled.collect::<Result<Vec<_>, ModelError>>()
         };
+        let of_clips: Vec<_> = recorded.par_iter().enumerate().map(labelled).collect();
+        let mut forms: Vec<Vec<LabelledForm>> = all.iter().map(|_| Vec::new()).collect();
+        for of_clip in of_clips {
+            for (form, labelled) in forms.iter_mut().zip(of_clip?) {
+                form.push(labelled);
+            }
+        }
         Ok(Self {
-            forms: forms
-                .iter()
-                .enumerate()
-                .map(form)
-                .collect::<Result<_, _>>()?,
+            recorded,
+            forms,
             mirror: augmentation.mirror,
         })
     }
 
-    /// The clips as recorded.
-    pub fn recorded(&self) -> &[TrainingClip] {
-        &self.forms[0]
+    /// A clip as recorded.
+    ///
+    /// # Errors
+    /// Poses cannot be read.
+    pub fn recorded(&self, clip: usize) -> Result<TrainingClip, ModelError> {
+        let frames = self.forms[0][clip].form.frames();
+        self.cut(&self.forms[0][clip], clip, 0..frames)
+    }
+
+    fn cut(
+        &self,
+        LabelledForm { form, contacts }: &LabelledForm,
+        clip: usize,
+        frames: Range<usize>,
+    ) -> Result<TrainingClip, ModelError> {
+        let recorded = &self.recorded[clip];
+        Ok(TrainingClip {
+            clip: recorded.in_form(&recorded.clip, form, frames.clone())?,
+            contacts: contacts[frames].to_vec(),
+            facing: recorded.facing,
+        })
     }
 
     /// Draws the form in which a window of `frames` frames with `past` frames before it is seen,
-    /// and where it then starts.
+    /// and cuts it out with these.
+    ///
+    /// # Errors
+    /// Poses cannot be read.
     pub fn draw(
         &self,
         window: Window,
         frames: usize,
         past: usize,
         stream: &mut impl rand::Rng,
-    ) -> (&TrainingClip, usize) {
+    ) -> Result<TrainingClip, ModelError> {
         let sides = 1 + usize::from(self.mirror);
         let tempo = match self.forms.len() / sides {
             1 => 0,
@@ -165,13 +206,52 @@ impl Forms {
             false => 0,
         };
         let recorded = &self.forms[side][window.clip];
-        let clip = &self.forms[tempo * sides + side][window.clip];
-        match clip.frames().checked_sub(past + frames) {
-            Some(last) => (
-                clip,
-                (window.start * clip.frames() / recorded.frames()).clamp(past, past + last),
-            ),
+        let drawn = &self.forms[tempo * sides + side][window.clip];
+        let (form, start) = match drawn.form.frames().checked_sub(past + frames) {
+            Some(last) => {
+                let place = window.start * drawn.form.frames() / recorded.form.frames();
+                (drawn, place.clamp(past, past + last))
+            }
             None => (recorded, window.start),
-        }
+        };
+        self.cut(form, window.clip, start - past..start + frames)
+    }
+}
+
+impl<'d> RecordedClip<'d> {
+    fn new(clip: ClipSource<'d>) -> Result<Self, ModelError> {
+        let skeleton = clip.skeleton();
+        let facing = FacingJoints::of(skeleton).map_err(|error| ModelError::Data {
+            reason: format!("{}: {error}", clip.name()),
+        })?;
+        let partners = partners(skeleton);
+        Ok(Self {
+            mirrored: mirrored_skeleton(&partners, skeleton),
+            facing,
+            partners,
+            clip,
+        })
+    }
+
+    /// Frames of a form of it; `clip` has its poses.
+    fn in_form(
+        &self,
+        clip: &ClipSource<'_>,
+        form: &ClipForm,
+        frames: Range<usize>,
+    ) -> Result<Clip, ModelError> {
+        let poses = form.poses(clip, &self.partners, frames);
+        let skeleton = match form.is_mirrored() {
+            true => &self.mirrored,
+            false => self.clip.skeleton(),
+        };
+        Ok(Clip {
+            name: self.clip.name().into(),
+            skeleton: skeleton.clone(),
+            frame_time: self.clip.frame_time(),
+            poses: poses
+                .map_err(|error| ModelError::data(&error))?
+                .into_owned(),
+        })
     }
 }

@@ -59,8 +59,13 @@ pub fn generated_batch<S: RotationSettings>(
         .map(|clip| clip.window(start, frames, settings.past(), root_frame));
     let (given, truths): (Vec<_>, Vec<_>) = windows_of.unzip();
     let cut: Vec<Window> = (0..windows).map(|clip| Window { clip, start }).collect();
-    let statistics = WindowStatistics::of(&clips, &cut, frames, root_frame);
     let body = Body::of(&clips[0].clip.skeleton);
+    let statistics = WindowStatistics::of(
+        (body.joints(), clips.len()),
+        |clip| Ok(clips[clip].clone()),
+        (&cut, frames),
+        root_frame,
+    )?;
     Ok((Batch::of(&given, &truths, input), body, statistics))
 }
 

@@ -151,6 +151,10 @@ impl<S: RotationSettings> ModelSettings for S {
         Ok(Box::new(RotationTask::new(self, setting, build)?))
     }
 
+    fn reads_stored_clips(&self) -> bool {
+        true
+    }
+
     fn made_up_task(
         &self,
         frames: usize,

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::body::array;
 use super::{Body, TrainingClip};
-use crate::models::Statistics;
 use crate::models::transition::{RootFrame, Window};
 use crate::models::weights::{SavedWeights, WeightsError};
+use crate::models::{ModelError, Statistics};
 
 const NAMES: [&str; 3] = [
     "windows.root_deviation",
@@ -39,15 +39,19 @@ struct Sums {
 }
 
 impl WindowStatistics {
-    /// Of windows of `frames` frames.
+    /// Of windows of `frames` frames of so many clips of a body with so many joints; `clip` gives
+    /// one of them.
+    ///
+    /// # Errors
+    /// Those of `clip`.
     pub fn of(
-        clips: &[TrainingClip],
-        windows: &[Window],
-        frames: usize,
+        (joints, clips): (usize, usize),
+        clip: impl Fn(usize) -> Result<TrainingClip, ModelError> + Sync,
+        (windows, frames): (&[Window], usize),
         root_frame: RootFrame,
-    ) -> Self {
-        let joints = clips.first().map_or(0, |clip| clip.clip.skeleton.len());
-        let of_clip = |(index, clip): (usize, &TrainingClip)| {
+    ) -> Result<Self, ModelError> {
+        let of_clip = |index: usize| {
+            let clip = clip(index)?;
             let mut sums = Sums::zeros(3 + 3 * joints);
             let world = clip.clip.skeleton.world_positions(&clip.clip.poses);
             let own = windows.iter().filter(|window| window.clip == index);
@@ -60,23 +64,25 @@ impl WindowStatistics {
                 };
                 sums.add(&world[it.start..it.start + frames], turn);
             });
-            sums
+            Ok(sums)
         };
         // Clip by clip and then in order: the same sums on any number of threads.
-        let all: Vec<Sums> = clips.par_iter().enumerate().map(of_clip).collect();
+        let all: Vec<Result<Sums, ModelError>> = (0..clips).into_par_iter().map(of_clip).collect();
         let mut sums = Sums::zeros(3 + 3 * joints);
-        all.iter().for_each(|other| sums.join(other));
+        for other in all {
+            sums.join(&other?);
+        }
         let deviation = |k: usize| {
             let mean = sums.sums[k] / sums.count.max(1.0);
             let variance = sums.squares[k] / sums.count.max(1.0) - mean * mean;
             // A joint that never moves is not divided by 0.
             variance.max(0.0).sqrt().max(1e-3)
         };
-        Self {
+        Ok(Self {
             root_deviation: [0, 1, 2].map(deviation),
             position_deviation: (3..3 + 3 * joints).map(deviation).collect(),
             ranges: sums.bounds.map(|[least, most]| (most - least).max(1e-3)),
-        }
+        })
     }
 
     pub(super) fn statistics(&self, statistics: Statistics) -> Statistics {

@@ -15,9 +15,9 @@ use crate::models::transition::{Window, parts};
 use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
 
 /// The training of a network on the windows of clips.
-pub struct RotationTask {
+pub struct RotationTask<'d> {
     network: Arc<dyn RotationNetwork<f32>>,
-    forms: Forms,
+    forms: Forms<'d>,
     schedule: Schedule,
     shards: usize,
     reference: Reference,
@@ -29,7 +29,7 @@ pub struct RotationTask {
     epoch: Mutex<Option<(u64, Arc<Vec<Window>>)>>,
 }
 
-impl RotationTask {
+impl<'d> RotationTask<'d> {
     /// The training of the network that `build` makes for the body and the statistics of the
     /// training clips.
     ///
@@ -37,19 +37,19 @@ impl RotationTask {
     /// Clips of several skeletons or too short for a window; a network that cannot be built.
     pub fn new<S: RotationSettings>(
         settings: &S,
-        setting: &TaskSetting<'_>,
+        setting: &TaskSetting<'d>,
         build: impl FnOnce(
             &Body,
             &WindowStatistics,
         ) -> Result<Box<dyn RotationNetwork<f32>>, ModelError>,
     ) -> Result<Self, ModelError> {
-        let recordings = &setting.dataset.train;
-        let skeletons = recordings.iter().map(|it| (it.name(), &it.clip.skeleton));
+        let clips = setting.dataset.training_clips();
+        let skeletons = clips.iter().map(|it| (it.name(), it.skeleton()));
         let body = Body::of_all(skeletons)?;
         let (rule, threshold) = (settings.contact_rule(), setting.data.contact_threshold);
         let (augmentation, streams) = (settings.augmentation(), setting.streams);
-        let forms = Forms::of(recordings, augmentation, rule, threshold, streams)?;
-        let frames: Vec<usize> = recordings.iter().map(|it| it.frames()).collect();
+        let frames: Vec<usize> = clips.iter().map(|it| it.frames()).collect();
+        let forms = Forms::of(clips, augmentation, rule, threshold, streams)?;
         let config = settings.schedule();
         let past = settings.past();
         let schedule = Schedule::new(&frames, past, config, streams);
@@ -65,11 +65,11 @@ impl RotationTask {
             });
         }
         let statistics = WindowStatistics::of(
-            forms.recorded(),
-            schedule.windows(),
-            config.window,
+            (body.joints(), frames.len()),
+            |clip| forms.recorded(clip),
+            (schedule.windows(), config.window),
             settings.root_frame(),
-        );
+        )?;
         let network = build(&body, &statistics)?;
         Ok(Self {
             reference: Reference::new(body, settings)?,
@@ -97,7 +97,7 @@ impl RotationTask {
     }
 }
 
-impl Task<f32> for RotationTask {
+impl Task<f32> for RotationTask<'_> {
     fn steps(&self) -> u64 {
         self.schedule.steps()
     }
@@ -152,7 +152,7 @@ impl Task<f32> for RotationTask {
 
 /// A step of the training.
 struct RotationStep<'t> {
-    task: &'t RotationTask,
+    task: &'t RotationTask<'t>,
     plan: BatchPlan,
     step: u64,
     epoch: u64,
@@ -176,12 +176,13 @@ impl Step<f32> for RotationStep<'_> {
         for index in range {
             let (streams, past) = (self.task.streams, self.task.past);
             let mut stream = streams.stream("augmentation", &[self.step, index as u64]);
-            let (clip, start) = self
+            let clip = self
                 .task
                 .forms
-                .draw(windows[index], *frames, past, &mut stream);
+                .draw(windows[index], *frames, past, &mut stream)
+                .map_err(|error| AutogradError::Input(error.to_string()))?;
             let root_frame = self.task.reference.root_frame;
-            let (window, truth) = clip.window(start, *frames, past, root_frame);
+            let (window, truth) = clip.window(past, *frames, past, root_frame);
             given.push(window);
             truths.push(truth);
         }

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::data::{DataConfig, DataError, FileReading, Recording};
-use crate::motion::{Clip, FeatureConfig, FeatureError, Mapping, at_tempo, features, mirror_image};
+use crate::motion::{Clip, FeatureConfig, FeatureError, Mapping, features};
 
 /// A clip on the dance skeleton, with its features.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,22 +75,6 @@ impl DanceClip {
             .map(|recording| Self::measure(recording.clip.clone(), config))
             .collect();
         measured.into_iter().collect()
-    }
-
-    /// The clip in the mirror, see [`mirror_image`].
-    ///
-    /// # Errors
-    /// The image cannot be measured.
-    pub fn mirror_image(&self, config: &DataConfig) -> Result<Self, DataError> {
-        Self::new(mirror_image(&self.clip), None, config)
-    }
-
-    /// The clip danced `tempo` times as fast, see [`at_tempo`].
-    ///
-    /// # Errors
-    /// It would be too long, or cannot be measured.
-    pub fn at_tempo(&self, tempo: f64, config: &DataConfig) -> Result<Self, DataError> {
-        Self::new(at_tempo(self.clip.clone(), tempo)?, None, config)
     }
 
     /// Number of frames.

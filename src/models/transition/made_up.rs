@@ -1,27 +1,31 @@
 //! Made-up windows, for timings: the very step that a training runs, on numbers that mean nothing.
 
+use std::borrow::Cow;
 use std::iter;
 
 use glam::{DQuat, DVec3};
-use ndarray::Array2;
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::settings::TransitionSettings;
+use super::augmentation::Augmentation;
+use super::settings::{AugmentationConfig, TransitionSettings};
 use super::single_frames;
 use super::task::{StepPlan, TransitionStep};
+use super::training_clips::TrainingClips;
 use super::training_windows::TrainingWindows;
-use super::{DanceClip, Forcing, Network, RootFrame, Standardisation, Window};
+use super::{Forcing, Network, RootFrame, Standardisation, Window};
 use crate::autograd::Parameters;
+use crate::data::{ClipSource, DataError};
 use crate::models::settings::InitialRng;
 use crate::models::{Generator, ModelError, Statistics, Step, Streams, Task};
-use crate::motion::features::FEATURES;
-use crate::motion::{Clip, JOINTS, Pose, Skeleton};
+use crate::motion::{
+    Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, JOINTS, Joint, Pose, Skeleton,
+};
 use crate::nn::Initialiser;
 
 /// One step without end: own predictions fed back, dropout on.
 pub(super) struct MadeUpTask {
     network: std::sync::Arc<dyn Network<f32>>,
-    windows: TrainingWindows,
+    windows: TrainingWindows<'static>,
     plan: StepPlan,
     shards: usize,
 }
@@ -39,25 +43,37 @@ impl MadeUpTask {
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Self, ModelError> {
         let mut rng = InitialRng::seed_from_u64(streams.seed());
-        let features = Array2::from_shape_simple_fn((frames + batch, FEATURES), || {
-            rng.random_range(-1.0..1.0)
-        });
         let poses = iter::repeat_with(|| Pose {
             translations: vec![DVec3::Y; JOINTS],
             rotations: (0..JOINTS)
                 .map(|_| DQuat::from_rotation_x(rng.random_range(-1.0..1.0)))
                 .collect(),
         });
+        let joints = DANCE_JOINTS.iter().zip(DANCE_PARENTS);
+        let joints = joints.map(|(name, parent)| Joint {
+            name: (*name).into(),
+            parent,
+            offset: DVec3::Y,
+            end_sites: Vec::new(),
+        });
         let clip = Clip {
             name: "made up".into(),
-            skeleton: Skeleton { joints: Vec::new() },
+            skeleton: Skeleton {
+                joints: joints.collect(),
+            },
             frame_time: 1.0 / 30.0,
-            poses: poses.take(features.nrows()).collect(),
+            poses: poses.take(frames + batch).collect(),
         };
-        let standardisation = Standardisation::fit([features.view()]);
+        let recorded = Augmentation::new(1, &AugmentationConfig::default()).forms();
+        let clip = ClipSource::Held(Cow::Owned(clip));
+        let unreadable = |error: DataError| ModelError::data(&error);
+        let clips = TrainingClips::new(vec![clip], &recorded, FeatureConfig::default());
+        let clips = clips.map_err(unreadable)?;
+        let standardisation = Standardisation::fit_visited(|visit| clips.each(0..1, visit));
+        let standardisation = standardisation.map_err(unreadable)?;
         let network = settings.model.build(init, &standardisation)?;
         let single_frames = single_frames::draw(
-            &[features.nrows()],
+            &[frames + batch],
             network.single_frames(),
             &mut streams.stream("single_frames", &[0]),
         );
@@ -69,11 +85,7 @@ impl MadeUpTask {
                 windows: (0..batch).map(|start| Window { clip: 0, start }).collect(),
             },
             windows: TrainingWindows {
-                clips: vec![DanceClip {
-                    name: clip.name.clone(),
-                    features,
-                    clip,
-                }],
+                clips,
                 standardisation,
                 root_frame: RootFrame::World,
                 mapping: None,

@@ -31,6 +31,7 @@ mod single_frames;
 mod standardisation;
 mod task;
 mod trained;
+mod training_clips;
 mod training_windows;
 pub mod velocity_refinement;
 pub mod window;

@@ -1,5 +1,7 @@
 //! What the training clips hold: which controls a model has seen.
 
+use std::convert::Infallible;
+
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +12,8 @@ use crate::run::{RunError, Subject};
 
 /// Share of the frames that lie below a bound.
 const SHARE: f64 = 0.999;
+/// How many numbers are kept beside those that are asked for.
+const ROOM: usize = 1024;
 /// Standard deviations from the mean that stand for the bounds where no clips are at hand.
 const DEVIATIONS: f64 = 5.0;
 
@@ -49,39 +53,46 @@ impl DataRanges {
     /// Bounds over the frames of these clips, each `[frames, 154]`, not standardised. None for no
     /// frames.
     pub fn of<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Option<Self> {
-        let column = |number: usize| -> Vec<f64> {
-            let clips = clips.clone().into_iter();
-            clips
-                .flat_map(|clip| clip.column(number).to_vec())
-                .collect()
+        let frames = clips.clone().into_iter().map(|clip| clip.nrows()).sum();
+        let Ok(ranges) = Self::of_frames(frames, |visit| {
+            clips.into_iter().for_each(visit);
+            Ok::<(), Infallible>(())
+        });
+        ranges
+    }
+
+    /// The same of clips with so many frames together, which `each` goes through.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn of_frames<E>(
+        frames: usize,
+        each: impl FnOnce(&mut dyn FnMut(ArrayView2<'_, f64>)) -> Result<(), E>,
+    ) -> Result<Option<Self>, E> {
+        let Some(last) = frames.checked_sub(1) else {
+            return Ok(None);
         };
-        let speeds: Vec<f64> = clips
-            .clone()
-            .into_iter()
-            .flat_map(|clip| {
-                let frames = clip.rows().into_iter();
-                let speed = |row: ndarray::ArrayView1<f64>| {
-                    ROOT_VELOCITY
-                        .map(|number| row[number] * row[number])
-                        .sum::<f64>()
-                        .sqrt()
-                };
-                frames.map(speed).collect::<Vec<_>>()
-            })
-            .collect();
-        let heights = column(ROOT_POSITION.start + 1);
-        let mut factors = [0.0; PARTS];
-        for (factor, number) in factors.iter_mut().zip(VELOCITY_FACTORS) {
-            *factor = quantile(column(number), SHARE)?;
-        }
-        Some(Self {
-            root_speed: quantile(speeds, SHARE)?,
-            root_height: [
-                quantile(heights.clone(), 1.0 - SHARE)?,
-                quantile(heights, SHARE)?,
-            ],
-            velocity_factors: factors,
-        })
+        let at = |share: f64| ((share * last as f64).round() as usize).min(last);
+        let above = Extreme::new(frames - at(SHARE));
+        let below = Extreme::new(at(1.0 - SHARE) + 1);
+        let (mut speeds, mut highest, mut lowest) = (above.clone(), above.clone(), below);
+        let mut factors: [Extreme; PARTS] = std::array::from_fn(|_| above.clone());
+        each(&mut |clip| {
+            for row in clip.rows() {
+                let squares = ROOT_VELOCITY.map(|number| row[number] * row[number]);
+                speeds.take(squares.sum::<f64>().sqrt());
+                highest.take(row[ROOT_POSITION.start + 1]);
+                lowest.take(-row[ROOT_POSITION.start + 1]);
+                for (factor, number) in factors.iter_mut().zip(VELOCITY_FACTORS) {
+                    factor.take(row[number]);
+                }
+            }
+        })?;
+        Ok(Some(Self {
+            root_speed: speeds.least(),
+            root_height: [-lowest.least(), highest.least()],
+            velocity_factors: factors.map(Extreme::least),
+        }))
     }
 
     /// Wider bounds from means and standard deviations alone: five deviations from the mean.
@@ -102,13 +113,42 @@ impl DataRanges {
     }
 }
 
-/// The value below which this share of the values lies.
-fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    let last = values.len().checked_sub(1)?;
-    let at = (share * last as f64).round() as usize;
-    Some(
-        *values
-            .select_nth_unstable_by(at.min(last), f64::total_cmp)
-            .1,
-    )
+/// The largest of many numbers.
+#[derive(Clone)]
+struct Extreme {
+    /// How many are asked for.
+    count: usize,
+    /// These and, until they are sorted out, others.
+    values: Vec<f64>,
+}
+
+impl Extreme {
+    fn new(count: usize) -> Self {
+        Self {
+            count,
+            values: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, value: f64) {
+        self.values.push(value);
+        if self.values.len() >= 2 * self.count + ROOM {
+            self.keep();
+        }
+    }
+
+    fn keep(&mut self) {
+        if self.values.len() > self.count {
+            let descending = |a: &f64, b: &f64| b.total_cmp(a);
+            self.values
+                .select_nth_unstable_by(self.count - 1, descending);
+            self.values.truncate(self.count);
+        }
+    }
+
+    /// The least of the largest that were asked for.
+    fn least(mut self) -> f64 {
+        self.keep();
+        self.values.into_iter().fold(f64::INFINITY, f64::min)
+    }
 }

@@ -1,5 +1,7 @@
 //! What the root's numbers in a window are measured from.
 
+use std::convert::Infallible;
+
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
 
@@ -99,31 +101,55 @@ impl RootFrame {
         clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone,
         transition: usize,
     ) -> Standardisation {
-        let mut fitted = Standardisation::fit(clips.clone());
+        let Ok(fitted) = self.standardisation_of(transition, |visit| {
+            clips.clone().into_iter().for_each(visit);
+            Ok::<(), Infallible>(())
+        });
+        fitted
+    }
+
+    /// The same of clips that `each` goes through, one after the other, as often as it is called.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn standardisation_of<E>(
+        self,
+        transition: usize,
+        each: impl Fn(&mut dyn FnMut(ArrayView2<'_, f64>)) -> Result<(), E>,
+    ) -> Result<Standardisation, E> {
+        let mut fitted = Standardisation::fit_visited(&each)?;
         let columns = self.own_columns();
         if columns.is_empty() {
-            return fitted;
+            return Ok(fitted);
         }
-        let clips: Vec<Array2<f64>> = clips.into_iter().map(|clip| clip.to_owned()).collect();
-        let frames: Vec<usize> = clips.iter().map(Array2::nrows).collect();
-        let mut seen: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-        for window in windows(&frames, transition).windows {
-            let cut = self.window_features(&clips[window.clip], window.start, transition);
-            for (seen, &column) in seen.iter_mut().zip(&columns) {
-                seen.extend(cut.column(column).iter().skip(1));
-            }
-        }
-        for (seen, &column) in seen.iter().zip(&columns) {
-            let count = seen.len().max(1) as f64;
-            let mean = seen.iter().sum::<f64>() / count;
-            let variance = seen.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
-            fitted.mean[column] = mean;
+        // Of what `measure` makes of a column's number in the windows.
+        let mean_of = |measure: &dyn Fn(usize, f64) -> f64| -> Result<Vec<f64>, E> {
+            let (mut sums, mut count) = (vec![0.0; columns.len()], 0);
+            each(&mut |clip| {
+                let clip = clip.to_owned();
+                for window in windows(&[clip.nrows()], transition).windows {
+                    let cut = self.window_features(&clip, window.start, transition);
+                    count += transition;
+                    for (k, (sum, &column)) in sums.iter_mut().zip(&columns).enumerate() {
+                        for &x in cut.column(column).iter().skip(1) {
+                            *sum += measure(k, x);
+                        }
+                    }
+                }
+            })?;
+            let count = count.max(1) as f64;
+            Ok(sums.into_iter().map(|sum| sum / count).collect())
+        };
+        let means = mean_of(&|_, x| x)?;
+        let variances = mean_of(&|k, x| (x - means[k]).powi(2))?;
+        for ((&column, mean), variance) in columns.iter().zip(&means).zip(variances) {
+            fitted.mean[column] = *mean;
             fitted.std[column] = match variance.sqrt() {
                 std if std < SMALLEST_STD => 1.0,
                 std => std,
             };
         }
-        fitted
+        Ok(fitted)
     }
 }
 

@@ -1,6 +1,8 @@
 //! What a config says of a transition model beside what all experiments have. The defaults are
 //! those of Pan et al. 2021.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
@@ -11,7 +13,7 @@ use super::task::TransitionTask;
 use super::{DanceClip, ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
-use crate::data::{DataConfig, Recording};
+use crate::data::{ClipSource, DataConfig};
 use crate::experiment::ExperimentConfig;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
@@ -19,7 +21,6 @@ use crate::models::settings::{
 };
 use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Streams, Task};
-use crate::motion::MappingError;
 use crate::nn::Initialiser;
 
 /// Longest transition that a schedule may name, frames.
@@ -93,8 +94,7 @@ pub struct AugmentationConfig {
     /// Each window that is trained is, with the same probability, of the recorded clip or of the
     /// same clip at one of these tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`];
     /// of the recorded one where it would be too long for that at this tempo. The statistics of the
-    /// data leave them out. 16 at most, each from 0.25 to 4; at each, the training clips are in
-    /// memory once more.
+    /// data leave them out. 16 at most, each from 0.25 to 4.
     pub tempi: Vec<f64>,
 }
 
@@ -163,6 +163,10 @@ impl ModelSettings for TransitionSettings {
         Ok(Box::new(task))
     }
 
+    fn reads_stored_clips(&self) -> bool {
+        true
+    }
+
     fn made_up_task(
         &self,
         frames: usize,
@@ -204,7 +208,13 @@ impl ModelSettings for TransitionSettings {
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
         let model = self.load(self.kind(), saved)?;
-        let clips = self.clips(setting)?;
+        let measure = |clip: ClipSource<'_>| {
+            let clip = clip.whole().map_err(|error| ModelError::data(&error))?;
+            let measured = DanceClip::measure(clip.into_owned(), &setting.data.features());
+            measured.map_err(|error| ModelError::data(&error))
+        };
+        let clips: Vec<_> = self.clips(setting)?.into_iter().map(measure).collect();
+        let clips = clips.into_iter().collect::<Result<Vec<_>, _>>()?;
         let root_frame = self.model.root_frame();
         Ok(exported_batch::export(&model, root_frame, &clips, options)?)
     }
@@ -249,22 +259,19 @@ impl TransitionSettings {
         .seeing_through(self.model.mapping().cloned()))
     }
 
-    /// The training clips as the model sees them, measured.
-    fn clips(&self, setting: &TaskSetting<'_>) -> Result<Vec<DanceClip>, ModelError> {
-        let config = setting.data.features();
-        let recordings = setting.dataset.train.as_slice();
-        let mapped = self.model.mapping().map(|mapping| {
-            let mapped = recordings.iter().map(|recording| {
-                let clip = mapping.apply(&recording.clip)?;
-                Ok(Recording::of(clip))
-            });
-            mapped.collect::<Result<Vec<_>, MappingError>>()
-        });
-        let mapped = mapped
-            .transpose()
-            .map_err(|error| ModelError::data(&error))?;
-        let recordings = mapped.as_deref().unwrap_or(recordings);
-        DanceClip::measure_all(recordings, &config).map_err(|error| ModelError::data(&error))
+    /// The training clips as the model sees them.
+    fn clips<'d>(&self, setting: &TaskSetting<'d>) -> Result<Vec<ClipSource<'d>>, ModelError> {
+        let clips = setting.dataset.training_clips();
+        let Some(mapping) = self.model.mapping() else {
+            return Ok(clips);
+        };
+        let mapped = |clip: ClipSource<'_>| {
+            let clip = clip.whole().map_err(|error| ModelError::data(&error))?;
+            let mapped = mapping.apply(&clip);
+            let mapped = mapped.map_err(|error| ModelError::data(&error))?;
+            Ok(ClipSource::Held(Cow::Owned(mapped)))
+        };
+        clips.into_iter().map(mapped).collect()
     }
 }
 

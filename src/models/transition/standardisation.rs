@@ -1,5 +1,7 @@
 //! Standardisation: mean and standard deviation of each feature over the training clips.
 
+use std::convert::Infallible;
+
 use ndarray::{Array1, Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -40,11 +42,24 @@ impl Standardisation {
     /// clip it counts the turns that the dancer has made, which no window shows. No frames give
     /// mean 0 and deviation 1.
     pub fn fit<'a>(clips: impl IntoIterator<Item = ArrayView2<'a, f64>> + Clone) -> Self {
-        let frames: usize = clips.clone().into_iter().map(|clip| clip.nrows()).sum();
-        let count = frames.max(1) as f64;
-        let mean_of = |deviation: &dyn Fn(usize, f64) -> f64| {
-            let mut sums = vec![0.0; FEATURES];
-            for clip in clips.clone() {
+        let Ok(fitted) = Self::fit_visited(|visit| {
+            clips.clone().into_iter().for_each(visit);
+            Ok::<(), Infallible>(())
+        });
+        fitted
+    }
+
+    /// The same of clips that `each` goes through, one after the other, as often as it is called.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn fit_visited<E>(
+        each: impl Fn(&mut dyn FnMut(ArrayView2<'_, f64>)) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let mean_of = |deviation: &dyn Fn(usize, f64) -> f64| -> Result<Vec<f64>, E> {
+            let (mut sums, mut frames) = (vec![0.0; FEATURES], 0);
+            each(&mut |clip| {
+                frames += clip.nrows();
                 for frame in clip.rows() {
                     for (column, (sum, &value)) in sums.iter_mut().zip(frame).enumerate() {
                         let value = if column == FACING.start {
@@ -55,12 +70,13 @@ impl Standardisation {
                         *sum += deviation(column, value);
                     }
                 }
-            }
+            })?;
+            let count = frames.max(1) as f64;
             sums.iter_mut().for_each(|sum| *sum /= count);
-            sums
+            Ok(sums)
         };
-        let mean = mean_of(&|_, value| value);
-        let variance = mean_of(&|column, value| (value - mean[column]).powi(2));
+        let mean = mean_of(&|_, value| value)?;
+        let variance = mean_of(&|column, value| (value - mean[column]).powi(2))?;
         let std: Vec<f64> = variance
             .into_iter()
             .map(|variance| {
@@ -76,12 +92,12 @@ impl Standardisation {
         };
         let position_scale = root_mean_square(&std[BODY_POSITIONS]);
         let velocity_scale = root_mean_square(&std[BODY_VELOCITIES]);
-        Self {
+        Ok(Self {
             mean,
             std,
             position_scale,
             velocity_scale,
-        }
+        })
     }
 
     /// `(x - mean) / std` of the leading columns that `features` has, `[frames, up to 154]`.

@@ -10,20 +10,22 @@ use super::augmentation::Augmentation;
 use super::schedule::parts;
 use super::settings::{ScheduledSamplingConfig, TransitionSettings};
 use super::single_frames::{self, SingleFramePlan};
-use super::training_windows::{TrainingWindows, poses_of};
-use super::{
-    Batch, BatchPlan, DanceClip, DataRanges, Forcing, Network, Schedule, Standardisation, Window,
-};
+use super::training_clips::TrainingClips;
+use super::training_windows::TrainingWindows;
+use super::{Batch, BatchPlan, DataRanges, Forcing, Network, Schedule, Standardisation, Window};
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::counted::counted;
+use crate::data::{ClipSource, DataError};
 use crate::models::settings::TaskSetting;
 use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
 
 /// The training of a network on the windows of clips.
-pub struct TransitionTask {
+pub struct TransitionTask<'d> {
     network: Arc<dyn Network<f32>>,
-    windows: TrainingWindows,
+    windows: TrainingWindows<'d>,
     augmentation: Augmentation,
+    /// Frames of the clips in all their forms.
+    form_frames: Vec<usize>,
     schedule: Schedule,
     scheduled_sampling: ScheduledSamplingConfig,
     shards: usize,
@@ -33,7 +35,7 @@ pub struct TransitionTask {
     epoch: Mutex<Option<(usize, Arc<Vec<BatchPlan>>)>>,
 }
 
-impl TransitionTask {
+impl<'d> TransitionTask<'d> {
     /// The training of the network that `build` makes from the statistics of the training clips.
     ///
     /// # Errors
@@ -42,13 +44,15 @@ impl TransitionTask {
     pub fn new(
         settings: &TransitionSettings,
         setting: &TaskSetting<'_>,
-        clips: Vec<DanceClip>,
+        clips: Vec<ClipSource<'d>>,
         build: impl FnOnce(&Standardisation) -> Result<Box<dyn Network<f32>>, ModelError>,
     ) -> Result<Self, ModelError> {
-        let frames: Vec<usize> = clips.iter().map(DanceClip::frames).collect();
-        let ranges = DataRanges::of(clips.iter().map(|clip| clip.features.view()));
-        let (augmentation, clips) = Augmentation::of(clips, &settings.augmentation, &setting.data)
-            .map_err(|error| ModelError::data(&error))?;
+        let frames: Vec<usize> = clips.iter().map(ClipSource::frames).collect();
+        let augmentation = Augmentation::new(clips.len(), &settings.augmentation);
+        let unreadable = |error: DataError| ModelError::data(&error);
+        let forms = augmentation.forms();
+        let clips = TrainingClips::new(clips, &forms, setting.data.features());
+        let clips = clips.map_err(unreadable)?;
         let schedule = Schedule::new(&frames, &settings.schedule, setting.streams);
         let longest = frames.iter().copied().max().unwrap_or(0);
         if schedule.steps() == 0 {
@@ -68,11 +72,16 @@ impl TransitionTask {
         let root_frame = settings.model.root_frame();
         // Of the longest transitions that are trained.
         let transition = settings.schedule.max_len.min(longest.saturating_sub(1));
-        let measured = &clips[..augmentation.at_recorded_tempo()];
-        let views = measured.iter().map(|clip| clip.features.view());
-        let standardisation = root_frame.standardisation(views, transition);
+        let measured = 0..augmentation.at_recorded_tempo();
+        let standardisation = root_frame
+            .standardisation_of(transition, |visit| clips.each(measured.clone(), visit))
+            .map_err(unreadable)?;
+        let ranges = DataRanges::of_frames(frames.iter().sum(), |visit| {
+            clips.each(0..frames.len(), visit)
+        });
         Ok(Self {
             network: build(&standardisation)?.into(),
+            form_frames: clips.frames(),
             windows: TrainingWindows {
                 clips,
                 standardisation,
@@ -84,7 +93,7 @@ impl TransitionTask {
             scheduled_sampling: settings.scheduled_sampling.clone(),
             shards: settings.schedule.shards,
             streams: setting.streams,
-            ranges,
+            ranges: ranges.map_err(unreadable)?,
             epoch: Mutex::new(None),
         })
     }
@@ -114,14 +123,13 @@ impl TransitionTask {
                 &mut self.streams.stream("single_frames", &[step]),
             ),
         };
-        let clips = &self.windows.clips;
         self.augmentation
-            .vary(&mut plan, clips, &self.streams, step);
+            .vary(&mut plan, &self.form_frames, &self.streams, step);
         plan
     }
 }
 
-impl Task<f32> for TransitionTask {
+impl Task<f32> for TransitionTask<'_> {
     fn steps(&self) -> u64 {
         self.schedule.steps()
     }
@@ -210,7 +218,7 @@ pub(super) struct StepPlan {
 /// A step of the training.
 pub(super) struct TransitionStep<'t> {
     pub network: &'t dyn Network<f32>,
-    pub windows: &'t TrainingWindows,
+    pub windows: &'t TrainingWindows<'t>,
     pub shards: usize,
     pub plan: StepPlan,
     pub forcing: Forcing,
@@ -236,14 +244,20 @@ impl Step<f32> for TransitionStep<'_> {
         } = &self.plan;
         let of_shard = |len: usize| parts(len, self.shards()).nth(shard).unwrap_or(0..0);
         let shard_windows = &windows[of_shard(windows.len())];
-        let poses = || poses_of(&self.windows.clips, shard_windows, *length);
+        let unreadable = |error: DataError| AutogradError::Input(error.to_string());
+        let (features, poses) = self
+            .windows
+            .cut(shard_windows, *length, self.network.reads_poses())
+            .map_err(unreadable)?;
+        let single_frames_of_shard = &single_frames[of_shard(single_frames.len())];
         let batch = Batch {
-            features: self.windows.features(shard_windows, *length),
-            poses: self.network.reads_poses().then(poses),
+            features,
+            poses,
             total_windows: windows.len(),
             single_frames: self
                 .windows
-                .single_frames(&single_frames[of_shard(single_frames.len())]),
+                .single_frames(single_frames_of_shard)
+                .map_err(unreadable)?,
             total_single_frames: single_frames.len(),
         };
         self.network.losses(tape, &batch, self.forcing)
