@@ -17,7 +17,8 @@ fn whole_model(c: &mut Criterion) {
     group.sample_size(10);
     for frames in [5, 30, 70] {
         let config = ExperimentConfig::default();
-        let mut step = MeasuredStep::new(&config, frames, BATCH, THREADS).expect("a valid config");
+        let mut step =
+            MeasuredStep::new(&config, Some(frames), BATCH, THREADS).expect("a valid config");
         group.throughput(Throughput::Elements((frames * BATCH) as u64));
         group.bench_function(BenchmarkId::from_parameter(frames), |bencher| {
             bencher.iter_custom(|iterations| {

@@ -22,9 +22,9 @@ pub struct StepArgs {
     /// Override a key of the config; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Frames of a transition
-    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
-    frames: u16,
+    /// Frames of a window [default: 30 of a transition, else the config's]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    frames: Option<u16>,
     /// Windows in the batch
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
     batch: u16,
@@ -83,7 +83,7 @@ pub fn step(args: StepArgs) -> anyhow::Result<()> {
         Some(path) => ExperimentConfig::load(path, &sets)?,
         None => ExperimentConfig::with_sets(&sets)?,
     };
-    let (frames, batch) = (args.frames.into(), args.batch.into());
+    let (frames, batch) = (args.frames.map(usize::from), args.batch.into());
     let (threads, repetitions) = (args.threads.into(), args.repetitions.into());
     print(
         args.json,

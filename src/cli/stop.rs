@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 
 use super::notice::notice;
+use crate::ranks;
 
 /// Exit code after Ctrl-C or SIGTERM, as shells have it.
 const INTERRUPTED: u8 = 130;
@@ -77,7 +78,11 @@ pub fn interrupted(farewell: impl Display) -> ExitCode {
 pub fn command() -> String {
     let words = std::env::args_os().skip(1);
     let words = words.map(|word| format!(" {}", quote(&word.to_string_lossy())));
-    format!("keydance{}", words.collect::<String>())
+    let launcher = match ranks::launched() {
+        Some((_, count)) if count > 1 => format!("mpirun -n {count} "),
+        _ => String::new(),
+    };
+    format!("{launcher}keydance{}", words.collect::<String>())
 }
 
 /// A word for the shell.

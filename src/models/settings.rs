@@ -18,6 +18,9 @@ use crate::nn::Initialiser;
 use crate::report::demo::OpenDemo;
 use crate::report::figures::DrawFigures;
 
+/// Frames of a made-up transition where none are given.
+pub(super) const MADE_UP_FRAMES: usize = 30;
+
 /// What draws a model's initial weights.
 pub type InitialRng = ChaCha8Rng;
 
@@ -120,13 +123,14 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
         false
     }
 
-    /// Steps to time: each `batch` windows of `frames` frames, made up.
+    /// Steps to time: each `batch` windows of `frames` frames, made up; of as many as it has itself
+    /// where none are given.
     ///
     /// # Errors
     /// As [`ModelSettings::task`]; a model that has none.
     fn made_up_task(
         &self,
-        _frames: usize,
+        _frames: Option<usize>,
         _batch: usize,
         _streams: Streams,
         _init: &mut Initialiser<'_, f32, InitialRng>,

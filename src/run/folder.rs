@@ -204,6 +204,22 @@ impl RunFolder {
     }
 
     /// The file of the resolved config.
+    /// Refuses to go on writing to a folder that is no longer there as it was begun.
+    ///
+    /// # Errors
+    /// Its config is not there.
+    pub(crate) fn check_is_there(&self) -> Result<(), RunError> {
+        match self.config_path().is_file() {
+            true => Ok(()),
+            false => Err(RunError::Refused(format!(
+                "{} was moved or removed, or its {} was, while the training wrote to it; put it \
+                 back, and --resume goes on from its newest checkpoint",
+                self.path.display(),
+                Self::CONFIG
+            ))),
+        }
+    }
+
     pub fn config_path(&self) -> PathBuf {
         self.path.join(Self::CONFIG)
     }

@@ -73,6 +73,9 @@ pub struct Manifest {
     #[serde(default)]
     pub instructions: Vec<String>,
     pub threads: usize,
+    /// Processes that shared the steps, each with as many threads.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub ranks: usize,
     /// UTC, RFC 3339.
     pub started: String,
     pub finished: Option<String>,
@@ -99,6 +102,14 @@ pub struct Manifest {
 
 fn first_format() -> u32 {
     1
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_one(ranks: &usize) -> bool {
+    *ranks == 1
 }
 
 /// Size of a part of the data.
@@ -128,7 +139,7 @@ impl Manifest {
         dataset: &Dataset,
         task: &dyn Task<f32>,
         parameters: usize,
-        threads: usize,
+        (ranks, threads): (usize, usize),
     ) -> Self {
         let Build { version, commit } = Build::this();
         Self {
@@ -141,6 +152,7 @@ impl Manifest {
             cpu: cpu(),
             instructions: vec![instructions()],
             threads,
+            ranks,
             started: now(),
             finished: None,
             seconds: 0.0,

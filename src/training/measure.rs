@@ -28,13 +28,14 @@ pub struct MeasuredStep {
 }
 
 impl MeasuredStep {
-    /// Steps of the config's model on `batch` windows of `frames` frames.
+    /// Steps of the config's model on `batch` windows of `frames` frames, or of as many as the model
+    /// has itself.
     ///
     /// # Errors
     /// A config that has nothing to train or settings out of their range, no threads to be had.
     pub fn new(
         config: &ExperimentConfig,
-        frames: usize,
+        frames: Option<usize>,
         batch: usize,
         threads: usize,
     ) -> Result<Self, TrainingError> {
@@ -65,6 +66,11 @@ impl MeasuredStep {
     /// What was sent to other ranks so far, and how long they were waited for.
     pub fn traffic(&self) -> Traffic {
         self.stepper.together.traffic()
+    }
+
+    /// Frames that a step trains.
+    pub fn frames(&self) -> usize {
+        self.task.step(0).frames() as usize
     }
 
     /// Parts that a step is computed in.
@@ -106,7 +112,7 @@ pub struct StepSpeed {
     /// What this one sent in a step, bytes, and how long it waited for others, s; means.
     pub bytes_sent: f64,
     pub seconds_waiting: f64,
-    /// Of a step: the sum of the shards' gradients and Adam, s; mean.
+    /// Of a step: the sum of the shards' gradients and Adam, s; the least.
     pub seconds_updating: f64,
     /// The fastest of the timed steps, s.
     pub seconds: f64,
@@ -146,7 +152,7 @@ impl fmt::Display for StepSpeed {
 /// As [`MeasuredStep::new`] and [`MeasuredStep::run`].
 pub fn step_speed(
     config: &ExperimentConfig,
-    frames: usize,
+    frames: Option<usize>,
     batch: usize,
     threads: usize,
     repetitions: usize,
@@ -154,18 +160,24 @@ pub fn step_speed(
 ) -> Result<StepSpeed, TrainingError> {
     let count = ranks.count();
     let mut step = MeasuredStep::new(config, frames, batch, threads)?.on(ranks);
-    let seconds = fastest(repetitions, || step.run())?;
+    let mut updating = Duration::MAX;
+    let seconds = fastest(repetitions, || {
+        let taken = step.run()?;
+        updating = updating.min(step.stepper.updating);
+        Ok::<_, TrainingError>(taken)
+    })?;
     let (traffic, steps) = (step.traffic(), step.done as f64);
+    let frames = step.frames();
     Ok(StepSpeed {
-        frames,
+        frames: frames / batch.max(1),
         batch,
         shards: step.shards(),
         threads,
         ranks: count,
         bytes_sent: traffic.bytes_sent as f64 / steps,
         seconds_waiting: traffic.seconds / steps,
-        seconds_updating: step.stepper.updating.as_secs_f64() / steps,
+        seconds_updating: updating.as_secs_f64(),
         seconds,
-        frame_steps_per_second: (frames * batch) as f64 / seconds,
+        frame_steps_per_second: frames as f64 / seconds,
     })
 }

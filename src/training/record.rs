@@ -32,7 +32,7 @@ impl<'r> Record<'r> {
             trainer.dataset,
             &*trainer.task,
             trainer.parameters.weights(),
-            trainer.threads,
+            (trainer.stepper.together.count(), trainer.threads),
         );
         let mut seconds_before = 0.0;
         if let Some(earlier) = run.manifest()? {
@@ -77,6 +77,7 @@ impl<'r> Record<'r> {
         if self.saved == Some(steps) {
             return Ok(());
         }
+        self.run.check_is_there()?;
         self.log.sync()?;
         let weights = trainer.weights_file()?;
         let [epoch, position] = trainer.task.place(steps);

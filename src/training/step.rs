@@ -64,7 +64,7 @@ pub struct Stepper {
     /// One for each shard that a step has had on this rank, zero between steps.
     gradients: Vec<Gradients<f32>>,
     pub together: Together,
-    /// Time that the sum of the shards' gradients and Adam took, over all steps.
+    /// Time that the sum of the shards' gradients and Adam took in the last step.
     pub updating: Duration,
 }
 
@@ -170,7 +170,7 @@ impl Stepper {
             gradients = &mut gradients[..1];
         }
         let norm = pool.install(|| adam.step_shards(parameters, gradients));
-        self.updating += begun.elapsed();
+        self.updating = begun.elapsed();
         match norm {
             Ok(norm) => {
                 take_up_buffers(parameters, &sum.buffers).map_err(|cause| failure(input, cause))?;

@@ -591,3 +591,23 @@ fn the_command_to_resume_quotes_what_a_shell_would_change() {
                    --set name=x --set 'data.split={ share = 0.5 }' --threads 2 --resume";
     assert!(text.lines().any(|line| line.trim() == command), "{text}");
 }
+
+#[test]
+fn a_training_whose_folder_is_moved_away_says_so_and_goes_on_from_where_it_was_moved() {
+    let small = SmallRun::new();
+    let (run, moved) = (small.path("run"), small.path("moved"));
+    let mut child = begin(&small, &run, &LONG);
+    wait_for_log(&mut child, &run, 2000);
+    fs::rename(&run, &moved).unwrap();
+    let ended = child.wait_with_output().unwrap();
+    let text = stderr(&ended);
+    assert_eq!(ended.status.code(), Some(1), "{text}");
+    assert!(text.contains("was moved or removed"), "{text}");
+    assert!(!run.exists(), "it was made again");
+    let resumed = begin(&small, &moved, &[&LONG[..], &["--resume"]].concat());
+    sleep(Duration::from_millis(1500));
+    kill(&resumed, "-INT");
+    let output = resumed.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("goes on after step"), "{text}");
+}

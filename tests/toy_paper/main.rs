@@ -242,7 +242,7 @@ fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {
 fn what_it_does_not_have_is_said() {
     let folder = configs();
     let config = load(folder.path(), &[]);
-    let error = step_speed(&config, 20, 3, 1, 1, Arc::new(Alone))
+    let error = step_speed(&config, Some(20), 3, 1, 1, Arc::new(Alone))
         .unwrap_err()
         .to_string();
     assert!(error.contains("toy: has no made-up step"), "{error}");

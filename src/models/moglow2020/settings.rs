@@ -186,7 +186,7 @@ impl ModelSettings for MoglowSettings {
 
     fn made_up_task(
         &self,
-        frames: usize,
+        frames: Option<usize>,
         batch: usize,
         streams: Streams,
         init: &mut Initialiser<'_, f32, InitialRng>,
@@ -194,7 +194,7 @@ impl ModelSettings for MoglowSettings {
         let mut settings = self.clone();
         settings.schedule.batch_size = batch;
         settings.schedule.shards = settings.schedule.shards.min(batch);
-        settings.set_frames(frames)?;
+        frames.map_or(Ok(()), |frames| settings.set_frames(frames))?;
         let made_up = made_up(settings.model.sequence_contexts(), batch, streams.seed())?;
         settings.features = made_up.features();
         let task = MoglowTask::new(&settings, &made_up.setting(streams), init)?;

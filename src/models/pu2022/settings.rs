@@ -181,14 +181,14 @@ impl ModelSettings for Pu2022Settings {
 
     fn made_up_task(
         &self,
-        frames: usize,
+        frames: Option<usize>,
         batch: usize,
         streams: Streams,
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Box<dyn Task<f32>>, ModelError> {
         let mut settings = self.clone();
         settings.schedule.batch_size = batch;
-        settings.set_length(frames)?;
+        frames.map_or(Ok(()), |frames| settings.set_length(frames))?;
         Ok(Box::new(MadeUpTask::new(settings, streams, init)?))
     }
 

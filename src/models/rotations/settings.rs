@@ -17,7 +17,8 @@ use crate::autograd::{Parameters, Real};
 use crate::data::DataConfig;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
-    GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
+    GradientCheckOptions, InitialRng, LoadError, MADE_UP_FRAMES, ModelSettings, TaskSetting,
+    ValueError,
 };
 use crate::models::transition::RootFrame;
 use crate::models::weights::SavedWeights;
@@ -157,11 +158,12 @@ impl<S: RotationSettings> ModelSettings for S {
 
     fn made_up_task(
         &self,
-        frames: usize,
+        frames: Option<usize>,
         batch: usize,
         streams: Streams,
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Box<dyn Task<f32>>, ModelError> {
+        let frames = frames.unwrap_or(MADE_UP_FRAMES);
         Ok(Box::new(MadeUpTask::new(
             self, frames, batch, streams, init,
         )?))
