@@ -14,7 +14,7 @@ use crate::run::{RunFolder, check_outputs, replace_file};
 pub struct ExportBatchArgs {
     /// Folder of a run
     run: PathBuf,
-    /// Folder of BVH files; windows come from its training clips
+    /// Folder of BVH files, or what prepare made of one; windows come from its training clips
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// File to write, safetensors

@@ -32,7 +32,7 @@ pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training
     #[arg(value_name = "RUN_DIR_OR_CONFIG")]
     run: PathBuf,
-    /// Folder of BVH files; the run's config says which of them test
+    /// Folder of BVH files, or what prepare made of one; the run's config says which of them test
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder for the figures

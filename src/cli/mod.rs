@@ -158,7 +158,7 @@ impl Cli {
             Command::Runs(args) => runs::run(args)?,
             Command::Demo(args) => return demo::run(args),
             Command::Choreography(args) => choreography::run(args)?,
-            Command::Prepare(args) => prepare::run(args)?,
+            Command::Prepare(args) => return prepare::run(args),
             Command::View(args) => view::run(args)?,
             Command::Plot(args) => plot::run(args)?,
             Command::Pack(args) => pack::run(args)?,

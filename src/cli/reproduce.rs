@@ -40,7 +40,7 @@ pub struct ReproduceArgs {
     /// Folder of configs, such as experiments/pan2021
     #[arg(value_name = "CONFIGS")]
     configs: PathBuf,
-    /// Folder of BVH files
+    /// Folder of BVH files, or what prepare made of one
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder for the results, small files: tables, figures, manifest, and a folder for each row

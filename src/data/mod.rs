@@ -31,7 +31,7 @@ pub use pairs::music_beside;
 #[cfg(feature = "papers")]
 pub(crate) use pairs::{sound_files, sound_of};
 pub use part::{DataPart, EmptyPart};
-pub use prepared::{Prepared, Stored, StoredClip, prepare};
+pub use prepared::{Prepared, Stored, StoredClip, is_prepared, prepare};
 pub use reading::{FileReading, RigReading, at_its_rate};
 pub use source::ClipSource;
 pub use windows::{Window, WindowCut};

@@ -174,7 +174,7 @@ impl RunFolder {
         match saved == found {
             true => Ok(()),
             false => Err(RunError::Refused(format!(
-                "{} was trained on data with digest {saved}, the data folder now has digest \
+                "{} was trained on data with digest {saved}, the data now has digest \
                  {found}",
                 path.display()
             ))),

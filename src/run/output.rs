@@ -43,7 +43,8 @@ pub fn check_outputs_beside<'a>(
             let file = file.display();
             Err(RunError::Refused(format!("{file} {problem}")))
         };
-        if place.is_dir() {
+        let names_a_folder = file.to_string_lossy().ends_with(std::path::is_separator);
+        if place.is_dir() || names_a_folder {
             return refused("is a folder; name a file in it".into());
         }
         if let Some(folder) = missing_folder(file, made) {

@@ -75,4 +75,13 @@ fn a_file_that_is_there_is_replaced_only_if_asked_and_never_a_clip() {
     again(&file, &["--force"]).success();
     let clip = dances.join("choreography_000_waltz.bvh");
     again(&clip, &["--force"]).failure();
+    let mine = folder.path().join("mine.toml");
+    std::fs::write(&mine, "name = 'mine'\n").unwrap();
+    again(&mine, &["--force"])
+        .failure()
+        .stderr(contains("is there and no prepared set"));
+    assert!(std::fs::read_to_string(&mine).unwrap().contains("mine"));
+    again(&folder.path().join("nowhere/"), &[])
+        .failure()
+        .stderr(contains("is a folder; name a file in it"));
 }

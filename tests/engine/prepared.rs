@@ -1,5 +1,6 @@
 //! Prepared sets: a folder's motions in one file.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -10,6 +11,10 @@ use proptest::prelude::*;
 use tempfile::TempDir;
 
 use crate::dance_clip::turning_clip;
+
+fn go_on(_done: usize, _all: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
 
 fn config() -> DataConfig {
     DataConfig {
@@ -43,7 +48,8 @@ fn folder() -> (TempDir, PathBuf) {
     let document = Bvh::from_clip(&moved, layout).unwrap();
     bvh::write(&dances.join("moved.bvh"), &document).unwrap();
     let file = folder.path().join("dances.prepared");
-    let prepared = prepare(&dances, &config(), &file, &mut |_, _| {}).unwrap();
+    let prepared = prepare(&dances, &config(), &file, &mut go_on);
+    let prepared = prepared.unwrap().unwrap();
     assert_eq!((prepared.clips, prepared.frames), (6, 5 * 40 + 15));
     assert_eq!(prepared.bytes, std::fs::metadata(&file).unwrap().len());
     (folder, file)
@@ -116,7 +122,7 @@ fn what_splits_and_measures_may_change_and_what_makes_poses_may_not() {
     };
     let says = problem(&file, &faster);
     assert!(
-        says.contains("data.fps at 30.0, and the config has 60.0"),
+        says.contains("data.fps = 30.0, and the config has 60.0"),
         "{says}"
     );
     let cut = DataConfig {
@@ -124,7 +130,10 @@ fn what_splits_and_measures_may_change_and_what_makes_poses_may_not() {
         ..config()
     };
     let says = problem(&file, &cut);
-    assert!(says.contains("data.skip_frames at its default"), "{says}");
+    assert!(
+        says.contains("data.skip_frames = (default), and the config has 2"),
+        "{says}"
+    );
     let music = DataConfig {
         music: true,
         ..config()
@@ -144,7 +153,7 @@ fn a_folder_of_music_is_not_prepared_without_it() {
         ..config()
     };
     let file = folder.path().join("other");
-    let refused = prepare(&dances(&folder), &music, &file, &mut |_, _| {});
+    let refused = prepare(&dances(&folder), &music, &file, &mut go_on);
     assert!(matches!(refused, Err(DataError::Prepared { .. })));
     assert!(!file.exists());
 }
@@ -154,10 +163,48 @@ fn a_clip_that_cannot_be_read_leaves_no_file() {
     let (folder, _) = folder();
     std::fs::write(dances(&folder).join("zz.bvh"), "no BVH").unwrap();
     let file = folder.path().join("other");
-    let refused = prepare(&dances(&folder), &config(), &file, &mut |_, _| {});
+    let refused = prepare(&dances(&folder), &config(), &file, &mut go_on);
     assert!(matches!(refused, Err(DataError::Bvh(_))));
     let mut left = std::fs::read_dir(folder.path()).unwrap();
     assert!(left.all(|it| !it.unwrap().file_name().to_string_lossy().contains("other")));
+}
+
+#[test]
+fn one_that_is_stopped_leaves_no_file() {
+    let (folder, _) = folder();
+    let file = folder.path().join("other");
+    let mut stop = |done: usize, all: usize| {
+        assert!(done > 0 && all == 6);
+        ControlFlow::Break(())
+    };
+    let stopped = prepare(&dances(&folder), &config(), &file, &mut stop).unwrap();
+    assert_eq!(stopped, None);
+    let mut left = std::fs::read_dir(folder.path()).unwrap();
+    assert!(left.all(|it| !it.unwrap().file_name().to_string_lossy().contains("other")));
+}
+
+#[test]
+fn a_prepared_set_is_not_prepared_again() {
+    let (folder, file) = folder();
+    let again = prepare(&file, &config(), &folder.path().join("again"), &mut go_on);
+    let says = again.err().unwrap().to_string();
+    assert!(says.contains("it is prepared already"), "{says}");
+}
+
+#[test]
+fn a_file_that_is_written_to_after_it_was_opened_is_read_no_further() {
+    let (_folder, file) = folder();
+    let read = Dataset::load_to_train(&file, &config()).unwrap();
+    let clips = read.training_clips();
+    assert!(clips[0].poses(0..2).is_ok());
+    let mut bytes = std::fs::read(&file).unwrap();
+    bytes.push(0);
+    std::fs::write(&file, bytes).unwrap();
+    let says = clips[0].poses(0..2).err().unwrap().to_string();
+    assert!(
+        says.contains("it was written to since it was opened"),
+        "{says}"
+    );
 }
 
 #[test]

@@ -85,17 +85,24 @@ impl Preparation {
         let key = keys.find(|key| own.get(*key) != asked.get(*key));
         let key = key.map_or("data", |key| key);
         let said = |keys: &Map<String, Value>| match keys.get(key) {
-            None => "its default".to_string(),
-            Some(Value::Object(_)) => "another value".to_string(),
+            None => "(default)".to_string(),
+            Some(Value::Object(_)) => "one".to_string(),
             Some(value) => value.to_string(),
+        };
+        let differ = match (own.get(key), asked.get(key)) {
+            (Some(Value::Object(_)), Some(Value::Object(_))) => {
+                format!("another data.{key} than the config has")
+            }
+            _ => format!(
+                "data.{key} = {}, and the config has {}",
+                said(&own),
+                said(&asked)
+            ),
         };
         Err(DataError::Prepared {
             path: path.into(),
             problem: format!(
-                "it was prepared with data.{key} at {}, and the config has {}: prepare the folder \
-                 again with this config",
-                said(&own),
-                said(&asked)
+                "it was prepared with {differ}: prepare the folder again with this config"
             ),
         })
     }

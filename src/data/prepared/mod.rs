@@ -14,6 +14,8 @@ mod stored;
 mod write;
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -35,7 +37,7 @@ const END: usize = 40;
 /// # Errors
 /// The file cannot be read, is none or damaged, or was prepared otherwise than the config says.
 pub(super) fn load(path: &Path, config: &DataConfig, stays: bool) -> Result<Dataset, DataError> {
-    refuse_other_data(config, path)?;
+    check_motions_alone(config, path, "give the folder")?;
     let file = Arc::new(PreparedFile::open(path)?);
     let Contents {
         preparation,
@@ -71,13 +73,22 @@ pub(super) fn load(path: &Path, config: &DataConfig, stays: bool) -> Result<Data
     Ok(dataset)
 }
 
-/// A prepared set holds motions: no music, and no lists of a data set's own.
-fn refuse_other_data(config: &DataConfig, path: &Path) -> Result<(), DataError> {
+/// Whether a file begins as a prepared set does.
+pub fn is_prepared(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    let file = path.is_file().then(|| File::open(path));
+    let read = file.and_then(|file| file.ok()?.read_exact(&mut start).ok());
+    read.is_some() && start == *MAGIC
+}
+
+/// Refuses data of which a prepared set holds less: it has no music, and no lists of a data set's
+/// own. `advice` says what to do.
+fn check_motions_alone(config: &DataConfig, path: &Path, advice: &str) -> Result<(), DataError> {
     let refused = |what: &str| {
         Err(DataError::Prepared {
             path: path.into(),
             problem: format!(
-                "prepared sets hold motions alone, and the config says {what}: give the folder"
+                "prepared sets hold motions alone, and the config says {what}: {advice}"
             ),
         })
     };

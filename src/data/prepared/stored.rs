@@ -5,6 +5,7 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 use bincode::config::{Configuration, Limit, LittleEndian, Varint};
 use glam::{DQuat, DVec3};
@@ -27,16 +28,26 @@ const FORMAT: Configuration<LittleEndian, Varint, Limit<LARGEST>> =
 pub(super) struct PreparedFile {
     path: PathBuf,
     file: Mutex<File>,
+    /// Its length and when it was written, as it was opened.
+    state: (u64, Option<SystemTime>),
+}
+
+/// Length of a file, and when it was last written to.
+fn state(file: &File) -> io::Result<(u64, Option<SystemTime>)> {
+    let metadata = file.metadata()?;
+    Ok((metadata.len(), metadata.modified().ok()))
 }
 
 impl PreparedFile {
     pub fn open(path: &Path) -> Result<Self, DataError> {
-        let file = File::open(path).map_err(|source| DataError::File {
+        let unreadable = |source| DataError::File {
             path: path.into(),
             source,
-        })?;
+        };
+        let file = File::open(path).map_err(unreadable)?;
         Ok(Self {
             path: path.into(),
+            state: state(&file).map_err(unreadable)?,
             file: Mutex::new(file),
         })
     }
@@ -49,27 +60,30 @@ impl PreparedFile {
     }
 
     fn bytes(&self, place: u64, count: usize) -> Result<Vec<u8>, DataError> {
-        let read = || -> io::Result<Vec<u8>> {
+        let read = || -> io::Result<Option<Vec<u8>>> {
             let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+            if state(&file)? != self.state {
+                return Ok(None);
+            }
             file.seek(SeekFrom::Start(place))?;
             let mut bytes = vec![0; count];
             file.read_exact(&mut bytes)?;
-            Ok(bytes)
+            Ok(Some(bytes))
         };
-        read().map_err(|error| match error.kind() {
+        let changed = || self.problem("it was written to since it was opened: begin again");
+        let read = read().and_then(|bytes| Ok(bytes.ok_or_else(changed)));
+        let bytes = read.map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => self.problem("it ends too early"),
             _ => DataError::File {
                 path: self.path.clone(),
                 source: error,
             },
-        })
+        });
+        bytes?
     }
 
     pub fn contents(&self) -> Result<Contents, DataError> {
-        let length = {
-            let file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-            file.metadata().map_or(0, |it| it.len())
-        };
+        let (length, _) = self.state;
         let none = || {
             self.problem(
                 "it is no prepared set: give a folder of BVH files, or what keydance prepare wrote",

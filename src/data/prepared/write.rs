@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 
 use super::contents::{Contents, Entry, JointEntry, Preparation};
-use super::refuse_other_data;
 use super::stored::{encoded, frames_in_bytes};
-use super::{MAGIC, VERSION};
+use super::{MAGIC, VERSION, check_motions_alone, is_prepared};
 use crate::data::config::DataConfig;
 use crate::data::dataset::{DataError, ReadClip, read_clip};
 use crate::data::folder::{clip_files, left_out};
@@ -33,7 +33,8 @@ pub struct Prepared {
 }
 
 /// Writes the clips of a folder into one file: read as the config's `[data]` says, split when the
-/// file is read. `done` hears of clips that are written, and of how many.
+/// file is read. `done` hears how many clips are written, of how many, and may stop it: then the
+/// result is none, and no file is left.
 ///
 /// # Errors
 /// The folder holds what a prepared set does not, a clip cannot be read, or the file cannot be
@@ -42,46 +43,62 @@ pub fn prepare(
     folder: &Path,
     config: &DataConfig,
     path: &Path,
-    done: &mut dyn FnMut(usize, usize),
-) -> Result<Prepared, DataError> {
-    refuse_other_data(config, path)?;
+    done: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<Prepared>, DataError> {
+    if is_prepared(folder) {
+        return Err(DataError::Prepared {
+            path: folder.into(),
+            problem: "it is prepared already, and prepare takes a folder of BVH files".into(),
+        });
+    }
+    let advice = "with data.split = { share = 0.8 } and without music its motions can be prepared";
+    check_motions_alone(config, folder, advice)?;
     let files = clip_files(folder)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.partial"));
-    let unwritable = |source| DataError::Written {
-        path: path.into(),
-        source,
-    };
-    let written = File::create(&partial)
-        .map_err(unwritable)
-        .and_then(|file| {
-            let mut writing = Writing::begin(file).map_err(unwritable)?;
-            let paths: Vec<_> = files.iter().collect();
-            for paths in paths.chunks(AT_ONCE * rayon::current_num_threads()) {
-                let read = paths
-                    .par_iter()
-                    .map(|(name, path)| read_clip(path, name, config.mapping.as_ref(), config));
-                let clips: Vec<_> = read.collect();
-                for clip in clips {
-                    writing.clip(clip?).map_err(unwritable)?;
-                }
-                done(writing.entries.len(), files.len());
-            }
-            let mut warnings = writing.notices();
-            warnings.extend(left_out(folder));
-            writing
-                .end(Preparation::of(config), warnings)
-                .map_err(unwritable)
-        })
-        .and_then(|prepared| {
-            fs::rename(&partial, path).map_err(unwritable)?;
-            Ok(prepared)
-        });
-    if written.is_err() {
+    // Of this process alone, as another may write to the same place.
+    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
+    let written = written(folder, config, (path, &partial), files, done);
+    if !matches!(written, Ok(Some(_))) {
         // What is left of it takes room on a full disk.
         let _ = fs::remove_file(&partial);
     }
     written
+}
+
+fn written(
+    folder: &Path,
+    config: &DataConfig,
+    (path, partial): (&Path, &Path),
+    files: BTreeMap<String, PathBuf>,
+    done: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<Prepared>, DataError> {
+    let unwritable = |source| DataError::Written {
+        path: path.into(),
+        source,
+    };
+    // A process of this number may have been killed.
+    let _ = fs::remove_file(partial);
+    let file = File::create_new(partial).map_err(unwritable)?;
+    let mut writing = Writing::begin(file).map_err(unwritable)?;
+    let paths: Vec<_> = files.iter().collect();
+    for paths in paths.chunks(AT_ONCE * rayon::current_num_threads()) {
+        let read = paths
+            .par_iter()
+            .map(|(name, path)| read_clip(path, name, config.mapping.as_ref(), config));
+        let clips: Vec<_> = read.collect();
+        for clip in clips {
+            writing.clip(clip?).map_err(unwritable)?;
+        }
+        if done(writing.entries.len(), files.len()).is_break() {
+            return Ok(None);
+        }
+    }
+    let mut warnings = writing.notices();
+    warnings.extend(left_out(folder));
+    let prepared = writing.end(Preparation::of(config), warnings);
+    let prepared = prepared.map_err(unwritable)?;
+    fs::rename(partial, path).map_err(unwritable)?;
+    Ok(Some(prepared))
 }
 
 /// A prepared set that is being written.
