@@ -18,9 +18,6 @@ use crate::nn::Initialiser;
 use crate::report::demo::OpenDemo;
 use crate::report::figures::DrawFigures;
 
-/// Frames of a made-up transition where none are given.
-pub(super) const MADE_UP_FRAMES: usize = 30;
-
 /// What draws a model's initial weights.
 pub type InitialRng = ChaCha8Rng;
 

@@ -70,16 +70,17 @@ impl PreparedFile {
             file.read_exact(&mut bytes)?;
             Ok(Some(bytes))
         };
-        let changed = || self.problem("it was written to since it was opened: begin again");
-        let read = read().and_then(|bytes| Ok(bytes.ok_or_else(changed)));
-        let bytes = read.map_err(|error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => self.problem("it ends too early"),
-            _ => DataError::File {
+        match read() {
+            Ok(Some(bytes)) => Ok(bytes),
+            Ok(None) => Err(self.problem("it was written to since it was opened: begin again")),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                Err(self.problem("it ends too early"))
+            }
+            Err(source) => Err(DataError::File {
                 path: self.path.clone(),
-                source: error,
-            },
-        });
-        bytes?
+                source,
+            }),
+        }
     }
 
     pub fn contents(&self) -> Result<Contents, DataError> {

@@ -17,10 +17,9 @@ use crate::autograd::{Parameters, Real};
 use crate::data::DataConfig;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
-    GradientCheckOptions, InitialRng, LoadError, MADE_UP_FRAMES, ModelSettings, TaskSetting,
-    ValueError,
+    GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
-use crate::models::transition::RootFrame;
+use crate::models::transition::{MADE_UP_FRAMES, RootFrame};
 use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Statistics, Streams, Task};
 use crate::motion::ContactRule;

@@ -22,6 +22,9 @@ use crate::motion::{
 };
 use crate::nn::Initialiser;
 
+/// Frames of a transition where none are given.
+pub(crate) const MADE_UP_FRAMES: usize = 30;
+
 /// One step without end: own predictions fed back, dropout on.
 pub(super) struct MadeUpTask {
     network: std::sync::Arc<dyn Network<f32>>,

@@ -40,6 +40,7 @@ mod windows;
 pub use crate::data::Window;
 pub use dance_clip::DanceClip;
 pub use kind::{Kind, ModelConfig, NoSettings};
+pub(crate) use made_up::MADE_UP_FRAMES;
 pub use network::{Batch, Forcing, Network, SingleFrame};
 pub use pose_windows::PoseWindows;
 pub use ranges::DataRanges;

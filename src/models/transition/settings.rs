@@ -8,7 +8,7 @@ use toml::Table;
 
 use super::exported_batch;
 use super::gradient_check::{self, GradientCheckError};
-use super::made_up::MadeUpTask;
+use super::made_up::{MADE_UP_FRAMES, MadeUpTask};
 use super::task::TransitionTask;
 use super::{DanceClip, ModelConfig, Standardisation, TrainedModel};
 use crate::autograd::Parameters;
@@ -17,8 +17,7 @@ use crate::data::{ClipSource, DataConfig};
 use crate::experiment::ExperimentConfig;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch};
 use crate::models::settings::{
-    GradientCheckOptions, InitialRng, LoadError, MADE_UP_FRAMES, ModelSettings, TaskSetting,
-    ValueError,
+    GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
 use crate::models::weights::SavedWeights;
 use crate::models::{Generator, ModelError, Streams, Task};
