@@ -90,11 +90,6 @@ impl TrainingClip {
         let past: Vec<&Pose> = self.clip.poses[start - past..start].iter().collect();
         (given.with_past(&past), truth)
     }
-
-    /// Number of frames.
-    pub fn frames(&self) -> usize {
-        self.clip.poses.len()
-    }
 }
 
 /// All forms in which clips are trained, their windows made when they are asked for; the labels of
