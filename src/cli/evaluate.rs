@@ -23,7 +23,8 @@ pub struct EvaluateArgs {
     /// Folder of a run, or the config of a model that needs no training
     #[arg(value_name = "RUN_DIR_OR_CONFIG")]
     run: PathBuf,
-    /// Folder of BVH files, or what prepare made of one; the config says which of them train, validate and test
+    /// Folder of BVH files, or what prepare made of one; the config says which of them train,
+    /// validate and test
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Which clips to score on

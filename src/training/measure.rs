@@ -28,8 +28,8 @@ pub struct MeasuredStep {
 }
 
 impl MeasuredStep {
-    /// Steps of the config's model on `batch` windows of `frames` frames, or of as many as the model
-    /// has itself.
+    /// Steps of the config's model on `batch` windows of `frames` frames, or of as many as the
+    /// model has itself.
     ///
     /// # Errors
     /// A config that has nothing to train or settings out of their range, no threads to be had.
