@@ -36,7 +36,7 @@ pub struct PrepareArgs {
     /// Override a key of the config, such as data.fps=60; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Replace the file if it is there
+    /// Replace the file if it is there and a prepared set
     #[arg(long)]
     force: bool,
 }
