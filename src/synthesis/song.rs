@@ -110,8 +110,9 @@ pub enum SongError {
     )]
     Rate { fps: f64, heard: f64 },
     #[error(
-        "{model} was trained with numbers of music that its data set gives; of a song they are not \
-         known"
+        "{model} hears the numbers that its data set gives of its music (features.audio = \
+         \"as_given\"), which of another song nobody can compute; take a model that was trained with \
+         features.audio = \"transflower85\" or \"onset_beats\""
     )]
     GivenMusic { model: String },
     #[error(
