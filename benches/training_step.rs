@@ -7,7 +7,7 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use keydance::experiment::ExperimentConfig;
 use keydance::nn::measure::{Measured, MeasuredLayers};
-use keydance::training::measure::MeasuredStep;
+use keydance::step::measure::MeasuredStep;
 
 const BATCH: usize = 128;
 const THREADS: usize = 2;

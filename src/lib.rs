@@ -68,6 +68,7 @@ pub mod optim;
 pub mod ranks;
 pub mod report;
 pub mod run;
+pub mod step;
 #[cfg(feature = "papers")]
 pub mod synthesis;
 pub mod training;

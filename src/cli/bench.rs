@@ -12,7 +12,7 @@ use crate::experiment::ExperimentConfig;
 use crate::models::transition::measure::GenerationSpeed;
 use crate::nn::measure::LayersSpeed;
 use crate::ranks;
-use crate::training::measure::step_speed;
+use crate::step::measure::step_speed;
 
 /// What is timed.
 #[derive(Debug, Args)]
@@ -28,7 +28,7 @@ pub struct StepArgs {
     /// Windows in the batch
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
     batch: u16,
-    /// Parts that the batch is computed in [default: the paper config's]
+    /// Parts that the batch is computed in [default: the config's]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     shards: Option<u16>,
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]

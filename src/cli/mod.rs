@@ -210,8 +210,8 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
     }
     notice(format_args!("error: {error:#}"));
     let_the_first_speak();
-    match error.downcast_ref() {
-        Some(TrainingError::NonFinite { .. }) => ExitCode::from(DIVERGED),
+    match error.downcast_ref::<TrainingError>() {
+        Some(error) if error.is_divergence() => ExitCode::from(DIVERGED),
         _ => ExitCode::FAILURE,
     }
 }

@@ -3,7 +3,7 @@
 use clap::Args;
 use rayon::ThreadPool;
 
-use crate::training::{TrainingError, pool};
+use crate::step::{StepError, pool};
 
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Threads {
@@ -33,7 +33,7 @@ impl Threads {
     ///
     /// # Errors
     /// The system gives no more threads.
-    pub fn pool(self) -> Result<ThreadPool, TrainingError> {
+    pub fn pool(self) -> Result<ThreadPool, StepError> {
         pool(self.count())
     }
 }

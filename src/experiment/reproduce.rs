@@ -14,7 +14,8 @@ use crate::data::{DataPart, Dataset};
 use crate::evaluation::{Evaluation, EvaluationError, PrintedTables, Protocol, ProtocolScores};
 use crate::models::Generator;
 use crate::run::{Manifest, RunFolder, RunState};
-use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError, pool};
+use crate::step::pool;
+use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
 
 /// Is told how a reproduction goes, by several threads where several rows are trained at the same
 /// time, and may stop it.
@@ -151,7 +152,7 @@ impl<'a> Reproduction<'a> {
             let finished = self.finish(row, trainings);
             let mut diverged = diverged.lock().unwrap_or_else(PoisonError::into_inner);
             let outcome = match finished {
-                Err(ReproduceError::Training(error @ TrainingError::NonFinite { .. })) => {
+                Err(ReproduceError::Training(error)) if error.is_divergence() => {
                     self.observer.diverged(row, &error);
                     *diverged = Some(error);
                     Ok(())
@@ -325,7 +326,7 @@ impl<'a> Reproduction<'a> {
     }
 
     fn evaluate(&self, row: &Row, model: &dyn Generator) -> Result<ProtocolScores, ReproduceError> {
-        let pool = pool(self.threads)?;
+        let pool = pool(self.threads).map_err(TrainingError::from)?;
         let mut scores = Vec::new();
         for protocol in row.config.protocols() {
             let evaluation =

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::RanksError;
 
-/// What a rank trains with, by name; digests where it is long.
+/// What a rank trains with, by name: a word, a digest or lines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identity(pub Vec<(String, String)>);
 
@@ -18,6 +18,7 @@ impl Identity {
         for (rank, other) in (1..).zip(rest) {
             let mut pairs = first.0.iter().zip(&other.0);
             if let Some(((name, ours), (_, theirs))) = pairs.find(|(one, other)| one != other) {
+                let (theirs, ours) = differing(theirs, ours);
                 return Err(RanksError::Other {
                     rank,
                     cause: format!("its {name} is {theirs}, that of rank 0 is {ours}"),
@@ -26,4 +27,12 @@ impl Identity {
         }
         Ok(())
     }
+}
+
+/// The first lines in which two texts differ.
+fn differing<'t>(one: &'t str, other: &'t str) -> (&'t str, &'t str) {
+    let mut lines = one.lines().zip(other.lines());
+    lines
+        .find(|(one, other)| one != other)
+        .unwrap_or((one, other))
 }

@@ -7,33 +7,19 @@ use crate::models::ModelError;
 use crate::optim::SettingError;
 use crate::ranks::RanksError;
 use crate::run::{FileError, RunError};
+use crate::step::StepError;
 
 /// Why a training cannot begin, go on or be saved.
 #[derive(Debug, Error)]
 pub enum TrainingError {
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A step is not to be had, or diverged: [`StepError::NonFinite`].
     #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error(transparent)]
-    Ranks(#[from] RanksError),
+    Step(#[from] StepError),
     /// What is asked for cannot be trained: what, and what to do.
     #[error("{0}")]
     Refused(String),
-    /// The training diverged, at this step or, where its cause are the weights, in the update that
-    /// ended it.
-    #[error(
-        "step {step} ({what}) is not finite: {cause}; the last checkpoint is as it was; \
-         try a lower optimiser.learning_rate or optimiser.clip_norm=1.0"
-    )]
-    NonFinite {
-        /// Counted from 1.
-        step: u64,
-        /// What the step trains.
-        what: String,
-        /// Operation and shapes.
-        cause: String,
-    },
     #[error(
         "validation.every_steps needs validation clips; set some aside with data.validation_share, \
          such as 0.1, or leave [validation] out"
@@ -41,9 +27,28 @@ pub enum TrainingError {
     NoValidationClips(#[from] EmptyPart),
 }
 
+impl TrainingError {
+    /// Whether a loss, a gradient or a weight was not finite.
+    pub fn is_divergence(&self) -> bool {
+        matches!(self, Self::Step(StepError::NonFinite { .. }))
+    }
+}
+
+impl From<ModelError> for TrainingError {
+    fn from(error: ModelError) -> Self {
+        StepError::from(error).into()
+    }
+}
+
+impl From<RanksError> for TrainingError {
+    fn from(error: RanksError) -> Self {
+        StepError::from(error).into()
+    }
+}
+
 impl From<SettingError> for TrainingError {
     fn from(error: SettingError) -> Self {
-        Self::Refused(format!("optimiser.{error}"))
+        StepError::from(error).into()
     }
 }
 

@@ -8,7 +8,6 @@ use super::best::Best;
 use super::error::TrainingError;
 use super::record::Record;
 use super::report::StepReport;
-use super::step::{StepInput, Stepper};
 use super::validation::Validation;
 use crate::autograd::Parameters;
 use crate::counted::counted;
@@ -22,6 +21,7 @@ use crate::optim::Adam;
 use crate::ranks::{Identity, Ranks, Together, Traffic};
 use crate::run::manifest::{self, Build};
 use crate::run::{RunError, RunFolder, RunState};
+use crate::step::{StepInput, Stepper};
 
 /// A training: weights, optimiser and place in the schedule.
 pub struct Trainer<'d> {
@@ -248,7 +248,7 @@ impl<'d> Trainer<'d> {
         let own = [
             ("program", Build::this().to_string()),
             ("instruction set", manifest::instructions()),
-            ("config", file_digest(self.config_toml.as_bytes())),
+            ("config", self.config_toml.clone()),
             ("data", self.dataset.digest.clone()),
             ("start", self.statistics_digest()?),
         ];
@@ -291,8 +291,8 @@ impl<'d> Trainer<'d> {
     /// of the config, where it stops and at the end, and then the weights.
     ///
     /// # Errors
-    /// A loss or gradient that is not finite ([`TrainingError::NonFinite`]; the checkpoints stay as
-    /// they are), or a file that cannot be written.
+    /// A loss or gradient that is not finite ([`TrainingError::is_divergence`]; the checkpoints stay
+    /// as they are), or a file that cannot be written.
     pub fn run(
         &mut self,
         out: Option<&RunFolder>,
@@ -309,7 +309,7 @@ impl<'d> Trainer<'d> {
             let report = match report.and_then(|scored| self.stepper.together.agree(scored)) {
                 Ok(report) => report,
                 Err(error) => {
-                    if let (TrainingError::NonFinite { .. }, Some(record)) = (&error, &mut record) {
+                    if let Some(record) = record.as_mut().filter(|_| error.is_divergence()) {
                         record.end(self, RunState::Diverged)?;
                     }
                     return Err(error);
@@ -372,21 +372,7 @@ impl<'d> Trainer<'d> {
             streams: self.streams,
             done,
         };
-        let (mut parameters, mut adam) = (self.parameters.clone(), self.adam.clone());
-        let stepper = &mut self.stepper;
-        let mut seconds = || {
-            let start = Instant::now();
-            let result = stepper.step(input, &mut parameters, &mut adam);
-            let taken = result.ok().map(|_| start.elapsed().as_secs_f64())?;
-            // Where it is short, a second is worth its time: where it is on any rank, on all.
-            let short = stepper.together.any(taken < 1.0).ok()?;
-            Some((taken, short))
-        };
-        // The first fills the buffers.
-        let (mut taken, short) = seconds()?;
-        if short {
-            (taken, _) = seconds()?;
-        }
+        let taken = self.stepper.trial(input, &self.parameters, &self.adam)?;
         let left = self.task.frame_steps().saturating_sub(self.frame_steps);
         let seconds = taken * left as f64 / step.frames().max(1) as f64;
         Duration::try_from_secs_f64(seconds).ok()

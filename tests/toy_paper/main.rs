@@ -23,7 +23,7 @@ use keydance::models::settings::GradientCheckOptions;
 use keydance::models::{Request, registry};
 use keydance::ranks::Alone;
 use keydance::run::{RunFolder, Subject};
-use keydance::training::measure::step_speed;
+use keydance::step::measure::step_speed;
 use keydance::training::{Outcome, Resumed, Trainer, TrainingError};
 use tempfile::TempDir;
 use thread_ranks::on_each;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::error::TrainingError;
+use super::error::StepError;
 use super::losses::Losses;
 use super::meeting::{Place, run_meeting};
 use crate::autograd::{AutogradError, BufferId, Gradients, Parameters, Tape, Workspace};
@@ -47,10 +47,10 @@ impl<'t> StepInput<'_> {
 ///
 /// # Errors
 /// The system gives no more threads.
-pub fn pool(threads: usize) -> Result<ThreadPool, TrainingError> {
+pub fn pool(threads: usize) -> Result<ThreadPool, StepError> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|cause| {
-        TrainingError::Refused(format!(
+        StepError::Refused(format!(
             "no pool of {}: {cause}",
             counted(threads, "thread")
         ))
@@ -71,7 +71,7 @@ pub struct Stepper {
 impl Stepper {
     /// # Errors
     /// No threads to be had.
-    pub fn new(threads: usize) -> Result<Self, TrainingError> {
+    pub fn new(threads: usize) -> Result<Self, StepError> {
         Ok(Self {
             pool: pool(threads)?,
             workspaces: Mutex::new(Vec::new()),
@@ -97,12 +97,35 @@ impl Stepper {
         input: StepInput<'_>,
         parameters: &mut Parameters<f32>,
         adam: &mut Adam<f32>,
-    ) -> Result<(Losses, f64), TrainingError> {
+    ) -> Result<(Losses, f64), StepError> {
         let result = self.try_step(input, parameters, adam);
         if result.is_err() {
             self.gradients.iter_mut().for_each(Gradients::set_zero);
         }
         result
+    }
+
+    /// Seconds that the step takes, tried on copies of weights and optimiser; none where it fails.
+    pub fn trial(
+        &mut self,
+        input: StepInput<'_>,
+        parameters: &Parameters<f32>,
+        adam: &Adam<f32>,
+    ) -> Option<f64> {
+        let (mut parameters, mut adam) = (parameters.clone(), adam.clone());
+        let mut seconds = || {
+            let start = Instant::now();
+            let result = self.step(input, &mut parameters, &mut adam);
+            let taken = result.ok().map(|_| start.elapsed().as_secs_f64())?;
+            // Where it is short, a second is worth its time: where it is on any rank, on all.
+            let short = self.together.any(taken < 1.0).ok()?;
+            Some((taken, short))
+        };
+        // The first fills the buffers.
+        match seconds()? {
+            (_, true) => seconds().map(|(taken, _)| taken),
+            (taken, false) => Some(taken),
+        }
     }
 
     /// Losses of this rank's shards; their gradients are added to `self.gradients`.
@@ -111,7 +134,7 @@ impl Stepper {
         input: StepInput<'_>,
         parameters: &Parameters<f32>,
         own: Range<usize>,
-    ) -> Result<Vec<Losses>, TrainingError> {
+    ) -> Result<Vec<Losses>, StepError> {
         let gradients = &mut self.gradients[..own.len()];
         let (workspaces, pool) = (&self.workspaces, &self.pool);
         let free = || workspaces.lock().unwrap_or_else(PoisonError::into_inner);
@@ -153,7 +176,7 @@ impl Stepper {
         input: StepInput<'_>,
         parameters: &mut Parameters<f32>,
         adam: &mut Adam<f32>,
-    ) -> Result<(Losses, f64), TrainingError> {
+    ) -> Result<(Losses, f64), StepError> {
         let shards = input.step.shards();
         let own = self.together.own_shards(shards);
         // A rank without a shard takes part in the sum.
@@ -213,7 +236,7 @@ fn trace(
         };
         let ended = run_meeting(input, meeting, parameters, place, true).err();
         return ended.map(|error| match error {
-            TrainingError::NonFinite { cause, .. } => cause,
+            StepError::NonFinite { cause, .. } => cause,
             error => error.to_string(),
         });
     }
@@ -280,20 +303,20 @@ fn run_shard(
     Ok(values)
 }
 
-pub(super) fn failure(input: StepInput<'_>, cause: AutogradError) -> TrainingError {
+pub(super) fn failure(input: StepInput<'_>, cause: AutogradError) -> StepError {
     match cause {
         AutogradError::NonFinite { .. } => non_finite(input, cause.to_string()),
         cause => refused(input, &cause),
     }
 }
 
-fn refused(input: StepInput<'_>, cause: &dyn std::error::Error) -> TrainingError {
+fn refused(input: StepInput<'_>, cause: &dyn std::error::Error) -> StepError {
     let (step, what) = (input.done + 1, input.step.describe());
-    TrainingError::Refused(format!("step {step} ({what}): {cause}"))
+    StepError::Refused(format!("step {step} ({what}): {cause}"))
 }
 
-fn non_finite(input: StepInput<'_>, cause: String) -> TrainingError {
-    TrainingError::NonFinite {
+fn non_finite(input: StepInput<'_>, cause: String) -> StepError {
+    StepError::NonFinite {
         step: input.done + 1,
         what: input.step.describe(),
         cause,

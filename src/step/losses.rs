@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::TrainingError;
+use super::error::StepError;
 use crate::autograd::{BufferId, Parameters, Tape};
 use crate::models::{LossTerms, Watched};
 use crate::ranks::Together;
@@ -40,10 +40,10 @@ impl Losses {
     /// # Errors
     /// What ended the step on this rank, or else on the first where something did.
     pub(super) fn of_all(
-        own: Result<Vec<Self>, TrainingError>,
+        own: Result<Vec<Self>, StepError>,
         parameters: &Parameters<f32>,
         together: &mut Together,
-    ) -> Result<Self, TrainingError> {
+    ) -> Result<Self, StepError> {
         if together.is_alone() {
             return Ok(own?.into_iter().fold(Self::default(), Self::plus));
         }
@@ -129,10 +129,10 @@ enum Failed {
     },
 }
 
-impl From<&TrainingError> for Failed {
-    fn from(error: &TrainingError) -> Self {
+impl From<&StepError> for Failed {
+    fn from(error: &StepError) -> Self {
         match error {
-            TrainingError::NonFinite { step, what, cause } => Self::NonFinite {
+            StepError::NonFinite { step, what, cause } => Self::NonFinite {
                 step: *step,
                 what: what.clone(),
                 cause: cause.clone(),
@@ -143,10 +143,10 @@ impl From<&TrainingError> for Failed {
 }
 
 impl Failed {
-    fn on(self, rank: usize) -> TrainingError {
+    fn on(self, rank: usize) -> StepError {
         match self {
-            Self::Refused(cause) => TrainingError::Refused(format!("rank {rank}: {cause}")),
-            Self::NonFinite { step, what, cause } => TrainingError::NonFinite {
+            Self::Refused(cause) => StepError::Refused(format!("rank {rank}: {cause}")),
+            Self::NonFinite { step, what, cause } => StepError::NonFinite {
                 step,
                 what,
                 cause: format!("rank {rank}: {cause}"),

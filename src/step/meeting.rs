@@ -6,9 +6,9 @@ use std::ops::Range;
 use ndarray::{ArrayD, ArrayViewD, Axis, Slice, concatenate};
 use rayon::prelude::*;
 
-use super::error::TrainingError;
+use super::error::StepError;
 use super::losses::Losses;
-use super::step::{StepInput, failure};
+use super::stepper::{StepInput, failure};
 use crate::autograd::{AutogradError, Gradients, Parameters, Tape, Var, Workspace};
 use crate::models::Meeting;
 use crate::ranks::Together;
@@ -35,7 +35,7 @@ pub(super) fn run_meeting(
     parameters: &Parameters<f32>,
     place: Place<'_>,
     trace: bool,
-) -> Result<Vec<Losses>, TrainingError> {
+) -> Result<Vec<Losses>, StepError> {
     let Place {
         workspaces,
         gradients,
@@ -123,7 +123,7 @@ struct Rows {
 }
 
 impl Rows {
-    fn of_all(own: ArrayD<f32>, together: &mut Together) -> Result<Self, TrainingError> {
+    fn of_all(own: ArrayD<f32>, together: &mut Together) -> Result<Self, StepError> {
         if together.is_alone() {
             return Ok(Self {
                 before: 0,
@@ -134,7 +134,7 @@ impl Rows {
         let said = together.share((shape, own.into_raw_vec_and_offset().0))?;
         let arrays = said.into_iter().map(|(shape, values)| {
             let array = ArrayD::from_shape_vec(shape, values);
-            array.map_err(|cause| TrainingError::Refused(format!("a rank's rows: {cause}")))
+            array.map_err(|cause| StepError::Refused(format!("a rank's rows: {cause}")))
         });
         let arrays: Vec<ArrayD<f32>> = arrays.collect::<Result<_, _>>()?;
         let rows = |array: &ArrayD<f32>| array.shape().first().copied().unwrap_or(0);
@@ -142,7 +142,7 @@ impl Rows {
         // Ranks without a shard bring nothing.
         let brought = arrays.iter().filter(|array| !array.is_empty());
         let views: Vec<ArrayViewD<'_, f32>> = brought.map(|array| array.view()).collect();
-        let refused = |cause: AutogradError| TrainingError::Refused(cause.to_string());
+        let refused = |cause: AutogradError| StepError::Refused(cause.to_string());
         let all = concatenated(&views).map_err(refused)?;
         Ok(Self { before, all })
     }

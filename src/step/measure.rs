@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::error::TrainingError;
-use super::step::{StepInput, Stepper};
+use super::error::StepError;
+use super::stepper::{StepInput, Stepper};
 use crate::autograd::Parameters;
 use crate::counted::counted;
 use crate::experiment::ExperimentConfig;
@@ -38,7 +38,7 @@ impl MeasuredStep {
         frames: Option<usize>,
         batch: usize,
         threads: usize,
-    ) -> Result<Self, TrainingError> {
+    ) -> Result<Self, StepError> {
         let streams = Streams::new(config.seed);
         let mut parameters = Parameters::new();
         let mut init = Initialiser::new(&mut parameters, streams.initialisation());
@@ -82,7 +82,7 @@ impl MeasuredStep {
     ///
     /// # Errors
     /// A loss or gradient that is not finite.
-    pub fn run(&mut self) -> Result<Duration, TrainingError> {
+    pub fn run(&mut self) -> Result<Duration, StepError> {
         let step = self.task.step(self.done);
         let input = StepInput {
             step: &*step,
@@ -157,14 +157,14 @@ pub fn step_speed(
     threads: usize,
     repetitions: usize,
     ranks: Arc<dyn Ranks>,
-) -> Result<StepSpeed, TrainingError> {
+) -> Result<StepSpeed, StepError> {
     let count = ranks.count();
     let mut step = MeasuredStep::new(config, frames, batch, threads)?.on(ranks);
     let mut updating = Duration::MAX;
     let seconds = fastest(repetitions, || {
         let taken = step.run()?;
         updating = updating.min(step.stepper.updating);
-        Ok::<_, TrainingError>(taken)
+        Ok::<_, StepError>(taken)
     })?;
     let (traffic, steps) = (step.traffic(), step.done as f64);
     let frames = step.frames();
