@@ -39,6 +39,7 @@ pub mod registry;
 #[cfg(feature = "papers")]
 pub mod rotations;
 pub mod settings;
+mod shards;
 mod statistics;
 pub mod streams;
 pub mod task;
@@ -51,6 +52,7 @@ pub mod weights;
 
 pub use generator::{Generator, ModelError, Motion, Request};
 pub use settings::{ModelKind, ModelSettings, Paper, TaskSetting};
+pub use shards::Shards;
 pub use statistics::Statistics;
 pub use streams::Streams;
 pub use task::{CRITICS, LossTerms, Meeting, Step, Task, Watched};

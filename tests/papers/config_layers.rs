@@ -4,8 +4,12 @@ use std::fs;
 
 use keydance::data::Split;
 use keydance::experiment::ExperimentConfig;
+use keydance::models::Shards;
 use keydance::models::moglow2020::MoglowSettings;
 use keydance::models::transition::{ModelConfig, TransitionSettings};
+use keydance::step::measure::MeasuredStep;
+
+use crate::sampled_training::{MOGLOW, SMALL};
 
 fn settings(config: &ExperimentConfig) -> &TransitionSettings {
     TransitionSettings::of(config).unwrap()
@@ -51,9 +55,36 @@ fn a_file_overrides_its_base_and_the_command_line_overrides_both() {
     let schedule = &settings(&config).schedule;
     assert_eq!(
         (schedule.max_len, schedule.shards, schedule.fraction),
-        (9, 2, 0.25)
+        (9, Shards::Fixed(2), 0.25)
     );
     assert_eq!(config.data.split, Split::Share(0.5));
+}
+
+#[test]
+fn shards_follow_from_the_batch_where_they_are_not_given() {
+    let pan = "model.kind = 'pan2021'";
+    for (config, sets, batch, shards) in [
+        (pan, vec![], 128, 4),
+        (pan, vec!["schedule.batch_size=512"], 512, 16),
+        (pan, vec![], 8, 1),
+        (pan, vec!["schedule.shards=16"], 128, 16),
+        ("model.kind = 'li2023'", vec![], 12, 2),
+        ("model.kind = 'li2023'", vec!["schedule.shards=12"], 3, 3),
+        ("model.kind = 'pu2022'", vec![], 20, 4),
+        (SMALL, vec![], 64, 2),
+        (MOGLOW, vec!["schedule.shards=from_batch"], 64, 2),
+    ] {
+        let config = load(&[("a.toml", config)], &sets).unwrap();
+        let toml = config.to_toml().unwrap();
+        let given = sets
+            .iter()
+            .find_map(|set| set.strip_prefix("schedule.shards="));
+        let given = given.filter(|given| *given != "from_batch");
+        let written = format!("shards = {}\n", given.unwrap_or("\"from_batch\""));
+        assert!(toml.contains(&written), "{toml}");
+        let step = MeasuredStep::new(&config, None, batch, 1).unwrap();
+        assert_eq!(step.shards(), shards, "{}, {batch}", config.model.kind());
+    }
 }
 
 #[test]
@@ -202,7 +233,11 @@ fn a_bad_value_names_key_and_remedy() {
         ),
         (
             "schedule.shards=129",
-            ["schedule.shards = 129", "from 1 to 128"],
+            ["schedule.shards = 129", "from 1 to 128, or from_batch"],
+        ),
+        (
+            "schedule.shards=many",
+            ["schedule.shards=many", "from_batch"],
         ),
         ("schedule.max_len=4", ["schedule.max_len = 4", "from 5 to"]),
         (

@@ -12,6 +12,7 @@ use keydance::autograd::{Gradients, Parameters, Real, Tape, Workspace};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{Dataset, Split};
 use keydance::experiment::ExperimentConfig;
+use keydance::models::Shards;
 use keydance::models::harvey2020::{Harvey2020, Harvey2020Config, RecurrentConfig};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::transition::ModelConfig;
@@ -551,7 +552,7 @@ fn training() -> (ExperimentConfig, Dataset) {
     own.schedule.min_len = 9;
     own.schedule.max_len = 12;
     own.schedule.batch_size = 16;
-    own.schedule.shards = 4;
+    own.schedule.shards = Shards::Fixed(4);
     own.schedule.fraction = 0.1;
     let clips = generate(&ChoreographyConfig {
         clips: 5,

@@ -7,8 +7,8 @@ use keydance::autograd::{AutogradError, BlockId, Tape};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataConfig, Dataset, Split};
 use keydance::experiment::ExperimentConfig;
-use keydance::models::LossTerms;
 use keydance::models::transition::{Batch, Forcing, Network, Standardisation};
+use keydance::models::{LossTerms, Shards};
 use keydance::motion::features::{FRAME, ROOT_POSITION, ROOT_VELOCITY};
 use ndarray::{Array1, Array2, Array3, ArrayView2, Axis, s};
 
@@ -89,7 +89,7 @@ fn shown(
     single_frames: usize,
 ) -> (Vec<Batch<f32>>, f64) {
     let (batches, statistics) = shown_with(data, single_frames, |config| {
-        settings(config).schedule.shards = shards;
+        settings(config).schedule.shards = Shards::Fixed(shards);
         settings(config).augmentation.mirror = mirror;
     });
     (batches, statistics.mean[ROOT_POSITION.start])
@@ -106,7 +106,7 @@ fn shown_with(
     own.schedule.min_len = 6;
     own.schedule.max_len = 6;
     own.schedule.batch_size = 8;
-    own.schedule.shards = 1;
+    own.schedule.shards = Shards::Fixed(1);
     change(&mut config);
     let shown = Arc::new(Mutex::new(Vec::new()));
     let witnessed = shown.clone();

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::models::Shards;
 use crate::models::settings::ValueError;
 use crate::music::FeatureSet;
 
@@ -73,6 +74,9 @@ impl AugmentationConfig {
     }
 }
 
+/// Least windows in a shard that are hardly slower than more.
+const WORTHWHILE: usize = 32;
+
 /// `[schedule]`
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -80,8 +84,8 @@ pub struct ScheduleConfig {
     pub steps: u64,
     /// Windows of a step.
     pub batch_size: usize,
-    /// Parts that a batch is computed in, on as many threads.
-    pub shards: usize,
+    /// Parts that a batch is computed in.
+    pub shards: Shards,
     /// Only training clips whose names begin with one of these; left out: all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub clips: Vec<String>,
@@ -105,7 +109,7 @@ impl Default for ScheduleConfig {
         Self {
             steps: 600_000,
             batch_size: 336,
-            shards: 1,
+            shards: Shards::default(),
             clips: Vec::new(),
         }
     }
@@ -131,7 +135,12 @@ impl ScheduleConfig {
         };
         ValueError::unless(self.steps > 0, "schedule.steps", 0, "at least 1")?;
         within("schedule.batch_size", self.batch_size, 65_536)?;
-        within("schedule.shards", self.shards, self.batch_size)
+        self.shards.check(self.batch_size)
+    }
+
+    /// Shards of a step.
+    pub fn shards(&self) -> usize {
+        self.shards.count(self.batch_size, WORTHWHILE)
     }
 }
 

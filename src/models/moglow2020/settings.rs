@@ -193,7 +193,6 @@ impl ModelSettings for MoglowSettings {
     ) -> Result<Box<dyn Task<f32>>, ModelError> {
         let mut settings = self.clone();
         settings.schedule.batch_size = batch;
-        settings.schedule.shards = settings.schedule.shards.min(batch);
         frames.map_or(Ok(()), |frames| settings.set_frames(frames))?;
         let made_up = made_up(settings.model.sequence_contexts(), batch, streams.seed())?;
         settings.features = made_up.features();

@@ -212,7 +212,7 @@ struct MoglowStep<'t> {
 
 impl Step<f32> for MoglowStep<'_> {
     fn shards(&self) -> usize {
-        self.task.settings.schedule.shards
+        self.task.settings.schedule.shards()
     }
 
     fn frames(&self) -> u64 {

@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::models::Shards;
 use crate::models::settings::ValueError;
 use crate::music::FeatureSet;
 
@@ -104,9 +105,8 @@ pub struct ScheduleConfig {
     pub steps: u64,
     /// Windows of a step.
     pub batch_size: usize,
-    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not
-    /// on the number of threads.
-    pub shards: usize,
+    /// Parts that a batch is computed in.
+    pub shards: Shards,
     /// Most key poses of a window; as many are drawn, from none to these.
     pub key_poses: usize,
     /// Least frames from one to the next.
@@ -167,10 +167,20 @@ impl Default for ScheduleConfig {
         Self {
             steps: 300_000,
             batch_size: 20,
-            shards: 1,
+            shards: Shards::default(),
             key_poses: 6,
             key_pose_distance: 10,
         }
+    }
+}
+
+/// Least windows in a shard: fewer are no slower, but each shard has a gradient of its own.
+const WORTHWHILE: usize = 5;
+
+impl ScheduleConfig {
+    /// Shards of a step.
+    pub fn shards(&self) -> usize {
+        self.shards.count(self.batch_size, WORTHWHILE)
     }
 }
 
@@ -223,7 +233,7 @@ impl Pu2022Settings {
         let schedule = &self.schedule;
         ValueError::unless(schedule.steps > 0, "schedule.steps", 0, "at least 1")?;
         within("schedule.batch_size", schedule.batch_size, 1, 65_536)?;
-        within("schedule.shards", schedule.shards, 1, 65_536)?;
+        schedule.shards.check(65_536)?;
         let distance = schedule.key_pose_distance;
         within("schedule.key_pose_distance", distance, 1, 10_000)?;
         let most = (window.generated() - 1) / distance + 1;

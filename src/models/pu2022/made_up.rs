@@ -35,7 +35,7 @@ impl MadeUpTask {
         let (windows, body) = settings.made_up(total, streams.seed())?;
         let network = settings.build(init, body.joints())?;
         let (given, truths): (Vec<_>, Vec<_>) = windows.into_iter().unzip();
-        let shards = parts(total, settings.schedule.shards.min(total)).map(|range| Batch {
+        let shards = parts(total, settings.schedule.shards()).map(|range| Batch {
             total_windows: total,
             ..Batch::of(
                 &given[range.clone()],

@@ -132,8 +132,7 @@ struct Pu2022Step<'t> {
 
 impl Step<f32> for Pu2022Step<'_> {
     fn shards(&self) -> usize {
-        let schedule = &self.task.settings.schedule;
-        schedule.shards.min(schedule.batch_size)
+        self.task.settings.schedule.shards()
     }
 
     fn frames(&self) -> u64 {

@@ -38,7 +38,7 @@ impl MadeUpTask {
         let (_, body, _) = sample(1, streams.seed())?;
         let statistics = WindowStatistics::ones(&body);
         let network = build(settings, init, &body, &statistics)?;
-        let count = settings.schedule().shards.min(batch);
+        let count = settings.schedule().shards_of(batch);
         let shards = parts(batch, count).enumerate().map(|(k, range)| {
             let (shard, _, _) = sample(range.len(), streams.seed() + k as u64)?;
             Ok(Batch {

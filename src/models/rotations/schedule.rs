@@ -6,6 +6,7 @@ use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Window, WindowCut};
+use crate::models::Shards;
 use crate::models::settings::ValueError;
 use crate::models::streams::Streams;
 
@@ -29,9 +30,8 @@ pub struct ScheduleConfig {
     pub epochs: u64,
     /// Most windows in a batch.
     pub batch_size: usize,
-    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not
-    /// on the number of threads.
-    pub shards: usize,
+    /// Parts that a batch is computed in.
+    pub shards: Shards,
     /// Share of the steps that is trained, above 0 and at most 1.
     pub fraction: f64,
     /// In place of `fraction`: about how many frames are trained.
@@ -62,14 +62,22 @@ impl Default for ScheduleConfig {
             lengths: LengthConfig::default(),
             epochs: 1000,
             batch_size: 12,
-            shards: 1,
+            shards: Shards::default(),
             fraction: 1.0,
             frame_steps: None,
         }
     }
 }
 
+/// Least windows in a shard that are hardly slower than more: a product over their frames.
+const WORTHWHILE: usize = 6;
+
 impl ScheduleConfig {
+    /// Shards of a batch of `windows`.
+    pub fn shards_of(&self, windows: usize) -> usize {
+        self.shards.count(windows, WORTHWHILE)
+    }
+
     /// # Errors
     /// The first value out of its range.
     pub fn check(&self) -> Result<(), ValueError> {
@@ -83,7 +91,7 @@ impl ScheduleConfig {
         within("lengths.max", self.lengths.max, 3, self.window)?;
         within("lengths.min", self.lengths.min, 3, self.lengths.max)?;
         within("batch_size", self.batch_size, 1, LARGEST_BATCH)?;
-        within("shards", self.shards, 1, LARGEST_BATCH)?;
+        self.shards.check(LARGEST_BATCH)?;
         ValueError::unless(
             self.epochs > 0,
             "schedule.epochs",

@@ -76,7 +76,7 @@ impl<'d> RotationTask<'d> {
             network: network.into(),
             forms,
             schedule,
-            shards: config.shards,
+            shards: config.shards_of(config.batch_size),
             statistics,
             past,
             streams,

@@ -93,7 +93,7 @@ impl MadeUpTask {
                 root_frame: RootFrame::World,
                 mapping: None,
             },
-            shards: settings.schedule.shards,
+            shards: settings.schedule.shards_of(batch),
         })
     }
 }

@@ -20,7 +20,7 @@ use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
 use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Streams, Task};
+use crate::models::{Generator, ModelError, Shards, Streams, Task};
 use crate::nn::Initialiser;
 
 /// Longest transition that a schedule may name, frames.
@@ -55,9 +55,8 @@ pub struct ScheduleConfig {
     pub min_len_every: usize,
     /// Most windows in a batch.
     pub batch_size: usize,
-    /// Parts that a batch is computed in. The weights depend on it, in the last bits; they do not
-    /// on the number of threads.
-    pub shards: usize,
+    /// Parts that a batch is computed in.
+    pub shards: Shards,
     /// Share of the schedule that is trained, above 0 and at most 1: random windows of the lengths
     /// of every epoch, below 1 in whole batches, see [`super::Schedule::new`].
     pub fraction: f64,
@@ -76,7 +75,7 @@ impl Default for ScheduleConfig {
             min_len_step: 4,
             min_len_every: 5,
             batch_size: 128,
-            shards: 4,
+            shards: Shards::default(),
             fraction: 1.0,
             frame_steps: None,
         }
@@ -282,7 +281,16 @@ fn is_share(x: f64) -> bool {
     x > 0.0 && x <= 1.0
 }
 
+/// Least windows in a shard that are hardly slower than more: a product over the windows of a
+/// frame.
+const WORTHWHILE: usize = 32;
+
 impl ScheduleConfig {
+    /// Shards of a batch of `windows`.
+    pub(super) fn shards_of(&self, windows: usize) -> usize {
+        self.shards.count(windows, WORTHWHILE)
+    }
+
     fn check(&self) -> Result<(), ValueError> {
         for (key, value, least, most) in [
             ("min_len", self.min_len, 1, LONGEST),
@@ -291,12 +299,12 @@ impl ScheduleConfig {
             ("min_len_step", self.min_len_step, 0, LONGEST),
             ("min_len_every", self.min_len_every, 1, LONGEST),
             ("batch_size", self.batch_size, 1, LARGEST_BATCH),
-            ("shards", self.shards, 1, self.batch_size),
         ] {
             let expected = format!("a whole number from {least} to {most}");
             let valid = (least..=most).contains(&value);
             ValueError::unless(valid, format!("schedule.{key}"), value, expected)?;
         }
+        self.shards.check(self.batch_size)?;
         let fraction = self.fraction;
         ValueError::unless(is_share(fraction), "schedule.fraction", fraction, SHARE)?;
         let Some(frame_steps) = self.frame_steps else {

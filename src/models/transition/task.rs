@@ -91,7 +91,7 @@ impl<'d> TransitionTask<'d> {
             augmentation,
             schedule,
             scheduled_sampling: settings.scheduled_sampling.clone(),
-            shards: settings.schedule.shards,
+            shards: settings.schedule.shards_of(settings.schedule.batch_size),
             streams: setting.streams,
             ranges: ranges.map_err(unreadable)?,
             epoch: Mutex::new(None),

@@ -251,7 +251,7 @@ impl ValleperezStep<'_> {
 
 impl Step<f32> for ValleperezStep<'_> {
     fn shards(&self) -> usize {
-        self.task.settings.schedule.shards
+        self.task.settings.schedule.shards()
     }
 
     fn frames(&self) -> u64 {
