@@ -183,14 +183,14 @@ def convert(motions, music, splits, out):
     lists = {part: names_in(splits / f"crossmodal_{part}.txt") for part in ("train", "val", "test")}
     if not lists["train"] or not lists["test"]:
         raise Refused(f"{splits} has no crossmodal_train.txt and crossmodal_test.txt")
-    train = [name for name in lists["train"] + lists["val"] if name in set(written)]
-    test = [name for name in lists["test"] if name in set(written)]
-    listed = {"train": train, "test": test}
+    keys = {"train": "train", "val": "validation", "test": "test"}
+    listed = {keys[part]: [it for it in names if it in set(written)] for part, names in lists.items()}
     text = "[data]\nmusic = true\n\n[data.split.list]\n"
     for part, names in listed.items():
         text += f"{part} = [{', '.join(repr(name + '.bvh') for name in names)}]\n"
     (out / "aistpp.toml").write_text(text)
-    print(f"{len(written)} dances, {len(train)} of them train and {len(test)} test: {out}")
+    counts = ", ".join(f"{len(names)} {part}" for part, names in listed.items())
+    print(f"{len(written)} dances, {counts}: {out}")
     return len(written)
 
 

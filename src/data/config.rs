@@ -133,9 +133,12 @@ pub enum Split {
     /// This share of the clips trains (rounded down), by the same rule as the dance split; the rest
     /// tests.
     Share(f64),
-    /// Named files; files of the folder that neither list names are left out.
+    /// Named files; files of the folder that no list names are left out. `validation_share` sets
+    /// aside further ones of those that train.
     List {
         train: Vec<String>,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        validation: Vec<String>,
         test: Vec<String>,
     },
 }

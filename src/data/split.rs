@@ -45,6 +45,7 @@ pub(super) fn split(
         let (value, expected) = (config.validation_share, "a share of at least 0 and below 1");
         return Err(fault("validation_share", value.to_string(), expected));
     }
+    let mut listed = Vec::new();
     let (train, test) = match &config.split {
         Split::Dance | Split::UnseenDancers(_) if names.len() != DANCE_TRAIN.0 + DANCE_TEST.0 => {
             let clips = DANCE_TRAIN.0 + DANCE_TEST.0;
@@ -118,9 +119,13 @@ pub(super) fn split(
             }
             cut(names, count)
         }
-        Split::List { train, test } => {
+        Split::List {
+            train,
+            validation,
+            test,
+        } => {
             let mut seen = HashSet::new();
-            for name in train.iter().chain(test) {
+            for name in train.iter().chain(validation).chain(test) {
                 if !seen.insert(name) {
                     let expected = "file names that are each in one list, once";
                     return Err(fault("split.list", name.clone(), expected));
@@ -133,10 +138,12 @@ pub(super) fn split(
                     return Err(misfit(format!("that {name} is in the split"), found));
                 }
             }
+            listed = validation.clone();
             (train.clone(), test.clone())
         }
     };
-    let (train, validation) = set_aside(train, config.validation_share);
+    let (train, mut validation) = set_aside(train, config.validation_share);
+    validation.append(&mut listed);
     Ok(Parts {
         train,
         validation,

@@ -50,12 +50,13 @@ fn a_folder_is_split_and_its_digest_depends_on_names_and_bytes_only() {
     assert_eq!(by_share.train[1].clip.poses.len(), 20);
     let list = Split::List {
         train: vec!["c.BVH".into()],
-        test: vec!["b.bvh".into(), "a.bvh".into()],
+        validation: vec!["a.bvh".into()],
+        test: vec!["b.bvh".into()],
     };
     let by_list = Dataset::load(folder.path(), &config(list)).unwrap();
     assert_eq!(
-        (names(&by_list.train), names(&by_list.test)),
-        (vec!["c.BVH"], vec!["b.bvh", "a.bvh"])
+        [&by_list.train, &by_list.validation, &by_list.test].map(|part| names(part)),
+        [["c.BVH"], ["a.bvh"], ["b.bvh"]]
     );
     assert_eq!(by_list.digest, by_share.digest);
     let hexadecimal = |bytes: &[u8]| {
@@ -157,6 +158,7 @@ fn an_unknown_key_is_named() {
         read.split,
         Split::List {
             train: vec!["a".into()],
+            validation: Vec::new(),
             test: vec!["b".into()]
         }
     );

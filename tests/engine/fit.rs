@@ -144,6 +144,7 @@ fn recorded_clip() -> Option<Clip> {
     let config = DataConfig {
         split: Split::List {
             train: vec!["Andria_Angry_v1-BVH.bvh".into()],
+            validation: Vec::new(),
             test: vec!["Anna_Active-BVH.bvh".into()],
         },
         ..DataConfig::default()

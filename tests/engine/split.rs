@@ -122,6 +122,7 @@ fn a_split_that_does_not_fit_names_both_sides() {
     );
     let list = |train: &str, test: &str| Split::List {
         train: vec![train.into()],
+        validation: Vec::new(),
         test: vec![test.into()],
     };
     let text = message(list("a.bvh", "z.bvh"), 4);

@@ -631,7 +631,7 @@ fn the_overfit_check_trains_on_one_clip_and_tests_on_none() {
     let file = "experiments/checks/overfit.toml";
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let config = ExperimentConfig::load(&file, &[]).unwrap();
-    let keydance::data::Split::List { train, test } = config.data.split else {
+    let keydance::data::Split::List { train, test, .. } = config.data.split else {
         panic!("{:?}", config.data.split);
     };
     assert_eq!((train.len(), test.len()), (1, 0));

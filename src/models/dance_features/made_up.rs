@@ -37,6 +37,7 @@ pub fn made_up(contexts: Contexts, batch: usize, seed: u64) -> Result<MadeUp, Mo
         fps: FPS,
         split: Split::List {
             train: dances.keys().cloned().collect(),
+            validation: Vec::new(),
             test: Vec::new(),
         },
         music: true,
