@@ -29,6 +29,7 @@ use thiserror::Error;
 
 use super::settings::ValueError;
 use crate::data::Recording;
+use crate::motion::rest_pose::RestPose;
 use crate::motion::{Clip, ContactRule, Mapping, Pose, Skeleton};
 #[cfg(feature = "music")]
 use crate::music::FeatureSet;
@@ -84,6 +85,8 @@ pub struct Motion {
     /// What the network said before it became motion, in the numbers of the model, a row a frame
     /// that was not given.
     pub raw: Option<Array2<f64>>,
+    /// First frames of the pieces that it was made in, where a model makes several frames at once.
+    pub pieces: Vec<usize>,
 }
 
 /// Which poses a model must be given.
@@ -182,6 +185,12 @@ pub trait Generator: Send + Sync {
     /// How it sees clips on another skeleton than its own: what it reads of a recording is measured
     /// on what this makes of it.
     fn mapping(&self) -> Option<&Mapping> {
+        None
+    }
+
+    /// The joints and the rest pose that its rotations are of; none where it dances on any, or does
+    /// not know.
+    fn rest_pose(&self) -> Option<RestPose<'_>> {
         None
     }
 
@@ -360,6 +369,7 @@ impl Motion {
             facing: None,
             contacts: None,
             raw: None,
+            pieces: Vec::new(),
         }
     }
 

@@ -1,8 +1,9 @@
 //! Whether a joint's rotation means the same on two skeletons.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
-use super::skeleton::Skeleton;
+use super::fit::{RotationFitError, fit_rotations};
+use super::{Pose, Skeleton};
 
 /// Bones below this share of the length of all are too short to have a direction: about 1 cm.
 const SHORT: f64 = 1.0 / 600.0;
@@ -35,4 +36,53 @@ pub fn other_rest_pose(ours: &[DVec3], theirs: &[DVec3]) -> Option<(usize, f64)>
     let apart = known.map(|(joint, (a, b))| (joint, a.angle_between(*b)));
     let widest = apart.max_by(|(_, one), (_, other)| one.total_cmp(other));
     widest.filter(|(_, apart)| *apart > REST)
+}
+
+/// Joints with the directions that their bones have at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestPose<'a> {
+    /// Names and parents.
+    pub skeleton: &'a Skeleton,
+    /// As [`rest_directions`] gives them.
+    pub directions: &'a [DVec3],
+}
+
+impl RestPose<'_> {
+    /// Whether a skeleton of the same joints has it, so that rotations mean the same poses.
+    pub fn is_of(&self, skeleton: &Skeleton) -> bool {
+        other_rest_pose(self.directions, &rest_directions(skeleton)).is_none()
+    }
+
+    /// Successive poses of a skeleton of the same joints on one with this rest pose and the lengths
+    /// that bones have in the first of them; and this skeleton. Joints come to the same places, as
+    /// near as their bones reach; the twist of a limb is that of the shortest way from the rest
+    /// pose.
+    ///
+    /// # Errors
+    /// No poses, or none of such a skeleton.
+    pub fn onto(
+        &self,
+        skeleton: &Skeleton,
+        poses: &[Pose],
+    ) -> Result<(Skeleton, Vec<Pose>), RotationFitError> {
+        let first = poses.first().ok_or(RotationFitError::NoFrames)?;
+        let mut stood = skeleton.clone();
+        let mut start = Pose {
+            translations: first.translations.clone(),
+            rotations: vec![DQuat::IDENTITY; skeleton.len()],
+        };
+        let bones = stood.joints.iter_mut().zip(&mut start.translations);
+        for ((joint, bone), direction) in bones.zip(self.directions).skip(1) {
+            if *direction != DVec3::ZERO {
+                *bone = *direction * bone.length();
+            }
+            joint.offset = *bone;
+        }
+        let places: Vec<Vec<DVec3>> = poses
+            .iter()
+            .map(|pose| pose.world_positions(skeleton))
+            .collect();
+        let fit = fit_rotations(&stood, &places, &start, None)?;
+        Ok((stood, fit.poses))
+    }
 }

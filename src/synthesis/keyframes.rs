@@ -181,7 +181,7 @@ pub(super) fn lengthened(
     }
 }
 
-fn unusable(path: &Path) -> impl Fn(DataError) -> KeyframeError {
+pub(super) fn unusable(path: &Path) -> impl Fn(DataError) -> KeyframeError {
     move |source| KeyframeError::Clip {
         file: path.into(),
         source: source.into(),
@@ -490,6 +490,7 @@ impl Keyframes {
                 time,
                 pose: rig.pose(keyframe.frame),
                 mapped: source.clip.clip.poses[keyframe.frame].clone(),
+                met: true,
             })
         });
         on_it.collect()

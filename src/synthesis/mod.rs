@@ -22,8 +22,10 @@ mod own_rig;
 pub mod regenerate;
 mod request;
 mod retarget;
+mod seams;
 mod sequence;
 pub mod song;
+mod song_files;
 mod summary;
 mod warning;
 

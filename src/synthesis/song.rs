@@ -1,6 +1,5 @@
 //! A dance to a song, from a seed and a few key poses, by a model that hears.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,16 +8,18 @@ use glam::DVec3;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::clip_keyframes::{Source, no_frame, read};
 use super::keyframes::{FileFrom, FileKeyframe, KeyframeChoice, KeyframeError, LONGEST};
-use super::retarget::check_rest;
+use super::seams::{Seam, ease};
+use super::song_files::{SongFile, SongFiles, SongPoses};
 use super::summary::Units;
 use crate::counted::counted;
 use crate::data::DataConfig;
 use crate::models::generator::{Given, Motion, NeededPoses, Request};
 use crate::models::{Generator, ModelError};
-use crate::motion::bvh::{self, Axis, Bvh, BvhError, channel_layout};
-use crate::motion::{Clip, Mapping, MappingError, Pose, Skeleton};
+use crate::motion::bvh::{self, Bvh, BvhError};
+use crate::motion::fit::RotationFitError;
+use crate::motion::rig::RigKeyframe;
+use crate::motion::{Clip, Mapping, MappingError, Pose, ResampleError};
 use crate::music::{Analysis, Cache, MusicError};
 
 /// Key poses nearer to the seed than this get a warning, frames.
@@ -160,6 +161,13 @@ pub enum SongError {
     Twice { frame: usize, keys: [String; 2] },
     #[error("{model} gave no rotations")]
     NoRotations { model: String },
+    #[error("{file}: its poses cannot be brought onto the skeleton that the model dances on")]
+    RestPose {
+        file: PathBuf,
+        source: RotationFitError,
+    },
+    #[error(transparent)]
+    Resample(#[from] ResampleError),
     #[error("the motion cannot be written")]
     Document(#[source] BvhError),
     #[error(transparent)]
@@ -179,7 +187,9 @@ pub struct Song {
     pub held: bool,
     /// What is odd about the files and what was asked for, a sentence each.
     pub notices: Vec<String>,
-    first: Source,
+    first: SongFile,
+    /// What is given as the rig of the seed's file has it.
+    on_rig: Vec<RigKeyframe>,
 }
 
 impl Song {
@@ -238,19 +248,13 @@ impl Song {
             Some(path) => Some(Mapping::read(path)?),
             None => data.mapping.clone(),
         };
-        let data = DataConfig {
-            skip_frames: 0,
-            ..data.clone()
-        };
-        let mut files = Files {
-            mapping,
-            data,
-            read: BTreeMap::new(),
-            notices: Vec::new(),
-        };
-        let (seed, held) = files.seed(&choice.seed, needed)?;
-        let dancer = (files.clip(choice.seed.file())?.skeleton.clone(), &seed[0]);
-        let keys = files.key_poses(&choice.key_poses, dancer, needed, frames)?;
+        let mut files = SongFiles::new(mapping, data, model.rest_pose());
+        let SongPoses {
+            skeleton,
+            seed,
+            keys,
+            on_rig,
+        } = files.given(&choice.seed, &choice.key_poses, needed, frames)?;
         notices.append(&mut files.notices);
         let (last, free) = (needed.saturating_sub(1), needed + NEAR);
         let near = keys.iter().filter(|(frame, _)| *frame < free);
@@ -260,7 +264,7 @@ impl Song {
                  frame is {last}, so the dance may jerk to it; put it at frame {free} or later"
             )
         }));
-        let first = files.read.remove(choice.seed.file());
+        let first = files.into_file(choice.seed.file());
         let first = first.ok_or(KeyframeError::None)?;
         let seed = seed.into_iter().enumerate();
         let given = seed.chain(keys).map(|(frame, pose)| Given {
@@ -272,16 +276,17 @@ impl Song {
         let request = Request {
             given: given.collect(),
             music: Some(heard),
-            ..Request::new(first.clip.skeleton.clone(), first.clip.frame_time, frames)
+            ..Request::new(skeleton, first.clip.frame_time, frames)
         };
         Ok(Self {
             request,
             music,
             file: choice.music.clone(),
             seed: needed,
-            held,
+            held: matches!(choice.seed, Seed::Pose(_)),
             notices,
             first,
+            on_rig,
         })
     }
 
@@ -290,7 +295,8 @@ impl Song {
         self.first.clip.poses.len()
     }
 
-    /// The dance that a model makes of it, as a clip `name`, and how well it meets its key poses.
+    /// The dance that a model makes of it, as a clip `name`, without the jumps where pieces of it
+    /// meet; and how well it meets its key poses.
     ///
     /// # Errors
     /// The model fails, or gives no rotations.
@@ -307,14 +313,20 @@ impl Song {
         };
         let motion = motions.into_iter().next().ok_or_else(no_rotations)?;
         motion.check(&self.request)?;
-        let Motion { poses, .. } = motion;
-        let clip = Clip {
+        let Motion { poses, pieces, .. } = motion;
+        let mut clip = Clip {
             name: name.into(),
             skeleton: self.request.skeleton.clone(),
             frame_time: self.request.frame_time,
             poses: poses.ok_or_else(no_rotations)?,
         };
-        let mut summary = self.summary(model.name(), &clip);
+        let seams = match pieces.is_empty() {
+            true => vec![self.seed],
+            false => pieces,
+        };
+        let keys: Vec<usize> = self.keys().map(|given| given.frame as usize).collect();
+        let seams = ease(&clip.skeleton, &mut clip.poses, &seams, &keys);
+        let mut summary = self.summary(model.name(), &clip, seams);
         let made = clip.poses.len().saturating_sub(self.seed) as f64;
         summary.frames_a_second = made / taken.max(1e-9);
         Ok((clip, summary))
@@ -331,14 +343,18 @@ impl Song {
         Ok(summary)
     }
 
-    fn summary(&self, model: &str, clip: &Clip) -> SongSummary {
-        let keys = self.request.given.iter();
-        let keys = keys.filter(|given| given.frame >= self.seed as i64);
+    /// The key poses among what is given.
+    fn keys(&self) -> impl Iterator<Item = &Given> {
+        let given = self.request.given.iter();
+        given.filter(|given| given.frame >= self.seed as i64)
+    }
+
+    fn summary(&self, model: &str, clip: &Clip, seams: Vec<Seam>) -> SongSummary {
         let about_root = |pose: &Pose| -> Vec<DVec3> {
             let world = pose.world_positions(&clip.skeleton);
             world.iter().map(|joint| *joint - world[0]).collect()
         };
-        let key_poses = keys.map(|given| {
+        let key_poses = self.keys().map(|given| {
             let frame = given.frame as usize;
             // Where the key pose looks is met too, so both are compared in the world's orientation.
             let (own, wanted) = (about_root(&clip.poses[frame]), about_root(&given.pose));
@@ -358,118 +374,26 @@ impl Song {
             seed_frames: self.seed,
             seed_is_held: self.held,
             key_poses: key_poses.collect(),
+            seams,
             frames_a_second: 0.0,
             units: Units::from([
                 ("seconds", "s"),
                 ("tempo", "beats/min"),
                 ("metre", "beats/bar"),
                 ("distance", "cm"),
+                ("jump", "cm"),
             ]),
         }
     }
 
-    /// A dance as a file's content: with the channels of the seed's file, or with Z X Y rotations
-    /// where these cannot hold it.
+    /// A dance as a file's content: on the rig of the seed's file where its joints were recognised
+    /// or mapped, in its unit, axis and rate; else with the file's channels, or with Z X Y
+    /// rotations where these cannot hold it.
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
     pub fn document(&self, dance: &Clip) -> Result<Bvh, SongError> {
-        let channels = self.first.channels.clone();
-        let channels =
-            channels.unwrap_or_else(|| channel_layout(dance, [Axis::Z, Axis::X, Axis::Y]));
-        Bvh::from_clip(dance, channels).map_err(SongError::Document)
-    }
-}
-
-/// The files of a choice as they are read.
-struct Files {
-    mapping: Option<Mapping>,
-    data: DataConfig,
-    read: BTreeMap<PathBuf, Source>,
-    notices: Vec<String>,
-}
-
-impl Files {
-    fn clip(&mut self, path: &Path) -> Result<&Clip, KeyframeError> {
-        if !self.read.contains_key(path) {
-            let (source, own) = read(path, self.mapping.as_ref(), &self.data)?;
-            self.notices.extend(own);
-            self.read.insert(path.into(), source);
-        }
-        Ok(&self.read[path].clip)
-    }
-
-    fn pose(&mut self, path: &Path, frame: usize) -> Result<Pose, KeyframeError> {
-        let clip = self.clip(path)?;
-        let pose = clip.poses.get(frame).cloned();
-        Ok(pose.ok_or_else(|| no_frame(clip, frame))?)
-    }
-
-    /// The seed's poses `[needed]`, and whether they are one that is held.
-    fn seed(&mut self, seed: &Seed, needed: usize) -> Result<(Vec<Pose>, bool), SongError> {
-        match seed {
-            Seed::Pose(FileFrom { file, frame, .. }) => {
-                Ok((vec![self.pose(file, *frame)?; needed], true))
-            }
-            Seed::Motion(file, first) => {
-                let clip = self.clip(file)?;
-                let last = clip.poses.len().saturating_sub(needed);
-                let first = first.unwrap_or(last);
-                let poses = clip.poses.get(first..first + needed);
-                let poses = poses.ok_or_else(|| SongError::ShortSeed {
-                    file: file.clone(),
-                    first,
-                    found: clip.poses.len().saturating_sub(first),
-                    needed,
-                })?;
-                Ok((poses.to_vec(), false))
-            }
-        }
-    }
-
-    /// Key poses by frame, on the bones of the seed's dancer.
-    fn key_poses(
-        &mut self,
-        asked: &[FileKeyframe],
-        (skeleton, dancer): (Skeleton, &Pose),
-        seed: usize,
-        frames: usize,
-    ) -> Result<Vec<(usize, Pose)>, SongError> {
-        let title = |key: &FileKeyframe| {
-            let FileKeyframe { file, frame, time } = key;
-            format!("{}:{frame}@{time}", file.display())
-        };
-        let mut asked: Vec<&FileKeyframe> = asked.iter().collect();
-        asked.sort_by_key(|key| key.time);
-        let fps = self.data.fps;
-        if let Some(pair) = asked.windows(2).find(|pair| pair[0].time == pair[1].time) {
-            return Err(SongError::Twice {
-                frame: pair[0].time,
-                keys: [title(pair[0]), title(pair[1])],
-            });
-        }
-        let mut keys = Vec::new();
-        for key in asked {
-            if key.time >= frames {
-                let (key, last) = (title(key), frames - 1);
-                return Err(SongError::Beyond { key, last, fps });
-            }
-            if key.time < seed {
-                let (key, last) = (title(key), seed - 1);
-                return Err(SongError::InSeed { key, last, fps });
-            }
-            let mut pose = self.pose(&key.file, key.frame)?;
-            if pose.translations.len() != dancer.translations.len() {
-                let files = [key.file.display().to_string(), "the seed's file".into()];
-                let joints = [pose.translations.len(), dancer.translations.len()];
-                return Err(KeyframeError::OtherJoints { files, joints }.into());
-            }
-            let clip = self.clip(&key.file)?;
-            check_rest(&clip.skeleton, &skeleton, &clip.name).map_err(KeyframeError::from)?;
-            pose.translations[1..].clone_from_slice(&dancer.translations[1..]);
-            keys.push((key.time, pose));
-        }
-        Ok(keys)
+        self.first.document(dance, &self.on_rig)
     }
 }
 
@@ -486,6 +410,8 @@ pub struct SongSummary {
     seed_frames: usize,
     seed_is_held: bool,
     key_poses: Vec<KeyPoseMiss>,
+    /// Where pieces meet, and how far the model jumped there before it was eased.
+    seams: Vec<Seam>,
     /// Frames that were made in a second of the clock: another each time, so no JSON holds it.
     #[serde(skip)]
     frames_a_second: f64,
@@ -532,6 +458,14 @@ impl fmt::Display for SongSummary {
             false => writeln!(f, "seed: {seed}")?,
         }
         writeln!(f, "made: {:.0} frames a second", self.frames_a_second)?;
+        let jumps = self.seams.iter().map(|seam| seam.jump);
+        let (count, most) = (self.seams.len(), jumps.fold(0.0, f64::max));
+        if count > 0 {
+            writeln!(
+                f,
+                "seams: {count}, where joints jump by {most:.1} cm at most; eased out"
+            )?;
+        }
         for KeyPoseMiss {
             frame,
             seconds,

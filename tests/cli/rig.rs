@@ -16,6 +16,7 @@ use tempfile::TempDir;
 use crate::generated_data::write_clips;
 use crate::rigs::RIGS;
 use crate::small_run::{keydance, stderr};
+use crate::song::FIXTURE;
 
 const FPS: f64 = 24.0;
 
@@ -102,6 +103,41 @@ fn a_dance_between_keyframes_of_any_rig_is_on_that_rig_in_its_unit_axis_channels
         assert_eq!(made.frames(), 61);
         let (made, document) = (made.to_clip(), document.to_clip());
         for frame in [0, 20, 40, 60] {
+            let [a, b] =
+                [&made, &document].map(|clip| clip.poses[frame].world_positions(&clip.skeleton));
+            let apart = farthest(&a, &b);
+            assert!(apart < 1e-5, "{}, frame {frame}: {apart} m", rig.name);
+        }
+    }
+}
+
+#[test]
+fn a_dance_to_a_song_from_a_seed_of_any_rig_is_on_that_rig_in_its_unit_axis_channels_and_rate() {
+    for (number, rig) in RIGS.iter().enumerate() {
+        let folder = TempDir::new().unwrap();
+        let [own, out] = ["own.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+        bvh::write(&own, &own_clip(number)).unwrap();
+        let document = bvh::read(&own).unwrap();
+        let mut command = FIXTURE.command("generate");
+        command.arg("--music").arg(FIXTURE.file(0, "wav"));
+        command
+            .arg("--seed-motion")
+            .arg(format!("{}:0", own.display()));
+        command
+            .arg("--keyframe")
+            .arg(format!("{}:70@4s", own.display()));
+        let output = command.arg("--out").arg(&out).output().unwrap();
+        let said = stderr(&output);
+        assert!(output.status.success(), "{}: {said}", rig.name);
+        assert!(said.contains("the result is on it"), "{}: {said}", rig.name);
+        let made = bvh::read(&out).unwrap();
+        assert_eq!(made.skeleton(), document.skeleton(), "{}", rig.name);
+        assert_eq!(made.channels(), document.channels(), "{}", rig.name);
+        assert!((made.frame_time() * FPS - 1.0).abs() < 1e-6);
+        assert_eq!(made.frames(), 192);
+        let (made, document) = (made.to_clip(), document.to_clip());
+        // The seed has 60 frames at 30 a second; each fourth of the file's is one of them.
+        for frame in (0..48).step_by(4) {
             let [a, b] =
                 [&made, &document].map(|clip| clip.poses[frame].world_positions(&clip.skeleton));
             let apart = farthest(&a, &b);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use glam::DVec3;
+use keydance::motion::Clip;
 use keydance::motion::bvh::{self, Bvh};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
@@ -14,6 +14,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::browser::{self, Loaded};
+use crate::rigs::from_another_rest_pose;
 use crate::trained_run::keydance;
 use crate::viewer_page::page_data;
 
@@ -182,44 +183,80 @@ fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
         .stderr(contains("give --music SONG"));
 }
 
+/// Mean distance of the joints of two frames, cm.
+fn apart(frames: [(&Clip, usize); 2]) -> f64 {
+    let [one, other] =
+        frames.map(|(clip, frame)| clip.poses[frame].world_positions(&clip.skeleton));
+    let distances = one.iter().zip(&other).map(|(a, b)| a.distance(*b));
+    distances.sum::<f64>() / one.len() as f64
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
 #[test]
-fn a_seed_or_key_pose_on_another_rest_pose_is_refused_and_nothing_is_written() {
+fn a_seed_and_key_poses_from_another_rest_pose_give_a_dance_on_that_rig() {
     let folder = TempDir::new().unwrap();
-    let (out, other) = (
-        folder.path().join("dance.bvh"),
-        folder.path().join("other.bvh"),
-    );
     let document = bvh::read(&FIXTURE.file(1, "bvh")).unwrap();
-    let mut clip = document.to_clip();
-    for joint in &mut clip.skeleton.joints {
-        joint.offset = DVec3::new(joint.offset.y, joint.offset.x, joint.offset.z);
-    }
-    for pose in &mut clip.poses {
-        let offsets = clip.skeleton.joints.iter().map(|joint| joint.offset);
-        let joints = pose.translations.iter_mut().zip(offsets).skip(1);
-        joints.for_each(|(place, offset)| *place = offset);
-    }
-    let turned = Bvh::from_clip(&clip, document.channels().to_vec()).unwrap();
+    let clip = document.to_clip();
+    let other = folder.path().join("other.bvh");
+    let turned = from_another_rest_pose(&clip);
+    let turned = Bvh::from_clip(&turned, document.channels().to_vec()).unwrap();
     bvh::write(&other, &turned).unwrap();
-    let file = other.display();
-    for (option, value) in [
-        ("--seed-motion", format!("{file}:0")),
-        ("--seed-pose", format!("{file}:3")),
-        ("--keyframe", format!("{file}:75@60")),
-    ] {
-        let mut command = match option {
-            "--keyframe" => FIXTURE.generate(&out),
-            _ => {
-                let mut command = FIXTURE.command("generate");
-                command.arg(FIXTURE.path("run")).arg("--out").arg(&out);
-                command.arg("--music").arg(FIXTURE.file(0, "wav"));
-                command
-            }
-        };
-        let output = command.args([option, &value]).assert().failure();
-        output.stderr(contains("another rest pose").and(contains("degrees")));
-        assert!(!out.exists(), "{option}");
+    let dance = |file: &Path, name: &str| {
+        let out = folder.path().join(name);
+        let mut command = FIXTURE.command("generate");
+        command.arg("--out").arg(&out);
+        command.arg("--music").arg(FIXTURE.file(0, "wav"));
+        command
+            .arg("--seed-motion")
+            .arg(format!("{}:40", file.display()));
+        command
+            .arg("--keyframe")
+            .arg(format!("{}:180@140", file.display()));
+        command.arg("--json").arg(out.with_extension("json"));
+        command.assert().success();
+        bvh::read(&out).unwrap()
+    };
+    let own = dance(&FIXTURE.file(1, "bvh"), "own.bvh");
+    let made = dance(&other, "made.bvh");
+    let written = bvh::read(&other).unwrap();
+    assert_eq!(made.skeleton(), written.skeleton());
+    assert_eq!(made.channels(), written.channels());
+    let (own, made) = (own.to_clip(), made.to_clip());
+    assert_eq!(own.poses.len(), made.poses.len());
+    for frame in 0..60 {
+        let apart = apart([(&own, frame), (&made, frame)]);
+        assert!(apart < 1e-6, "frame {frame}: {apart} cm");
     }
+    let key = &json(&folder.path().join("made.json"))["key_poses"][0];
+    assert!(key["distance"].as_f64().unwrap() < 12.0, "{key}");
+}
+
+#[test]
+fn a_dance_does_not_jump_where_the_model_does() {
+    let folder = TempDir::new().unwrap();
+    let [out, summary] = ["dance.bvh", "dance.json"].map(|name| folder.path().join(name));
+    let mut command = FIXTURE.generate(&out);
+    command.arg("--keyframe").arg(FIXTURE.key("75@95"));
+    let output = command.arg("--json").arg(&summary).assert().success();
+    output.stdout(contains("seams: 6, where joints jump by"));
+    let dance = bvh::read(&out).unwrap().to_clip();
+    let summary = json(&summary);
+    let seams = summary["seams"].as_array().unwrap();
+    let frames: Vec<u64> = seams
+        .iter()
+        .map(|it| it["frame"].as_u64().unwrap())
+        .collect();
+    assert_eq!(frames, [20, 60, 96, 136, 176, 216]);
+    let recorded = bvh::read(&FIXTURE.file(0, "bvh")).unwrap().to_clip();
+    let [speed, step] = [&recorded, &dance].map(|clip| apart([(clip, 19), (clip, 20)]));
+    let jump = seams[0]["jump"].as_f64().unwrap();
+    assert!(
+        step < 2.0 * speed + 0.1 * jump && 5.0 * step < jump,
+        "{speed} {jump} {step}"
+    );
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
-use keydance::motion::{DANCE_JOINTS, Joint, Skeleton};
+use glam::{DQuat, DVec3};
+use keydance::motion::{Clip, DANCE_JOINTS, Joint, Skeleton};
 
 /// A rig: its name, what it calls left and right, and its joints: name, parent and the dance
 /// skeleton's joints that it stands for, "-" for none. "%" is the side; `Toe@End` says that its End
@@ -383,4 +383,28 @@ fn place_of(joint: &str) -> Option<DVec3> {
         _ => return None,
     };
     Some(DVec3::new(side * x, y, z))
+}
+
+/// A clip with the same motion from another rest pose, in which all bones but the root's point along
+/// X.
+pub fn from_another_rest_pose(clip: &Clip) -> Clip {
+    let joints = &clip.skeleton.joints;
+    // Of each joint's frame, before to after; as the bone to its last child asks.
+    let mut turns = vec![DQuat::IDENTITY; joints.len()];
+    for joint in joints {
+        if let Some(parent) = joint.parent {
+            let bone = joint.offset.normalize_or(DVec3::X);
+            turns[parent] = DQuat::from_rotation_arc(bone, DVec3::X);
+        }
+    }
+    let above = |joint: &Joint| joint.parent.map_or(DQuat::IDENTITY, |parent| turns[parent]);
+    let mut other = clip.clone();
+    for (index, joint) in joints.iter().enumerate() {
+        other.skeleton.joints[index].offset = above(joint) * joint.offset;
+        for pose in &mut other.poses {
+            pose.translations[index] = above(joint) * pose.translations[index];
+            pose.rotations[index] = above(joint) * pose.rotations[index] * turns[index].inverse();
+        }
+    }
+    other
 }

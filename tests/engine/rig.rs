@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DQuat, DVec3};
+use keydance::data::choreography::{ChoreographyConfig, generate};
+use keydance::motion::rest_pose::{RestPose, rest_directions};
 use keydance::motion::rig::{Rig, RigKeyframe, nearest_frames, onto_rig, spread};
 use keydance::motion::{
     Clip, Conversion, DANCE_JOINTS, Mapping, Pose, Recognised, Skeleton, Unit, Up,
 };
 
-use crate::rigs::RIGS;
+use crate::rigs::{RIGS, from_another_rest_pose};
 
 /// A body that walks along and turns and bends every joint.
 fn moving(skeleton: &Skeleton, frames: usize) -> Clip {
@@ -215,6 +217,7 @@ fn a_motion_that_went_onto_the_dance_skeleton_comes_back_onto_its_rig() {
             time,
             pose: clip.poses[time].clone(),
             mapped: dance.poses[time].clone(),
+            met: true,
         };
         let back = onto_rig(&dance, &own, &[0, 25, 39].map(keyframe));
         for (frame, (made, pose)) in back.poses.iter().zip(&clip.poses).enumerate() {
@@ -240,6 +243,7 @@ fn fingers_go_from_their_pose_at_one_keyframe_to_that_at_the_next() {
         time,
         pose: clip.poses[time].clone(),
         mapped: dance.poses[time].clone(),
+        met: true,
     };
     let made = onto_rig(&dance, &own, &[0, 10].map(keyframe));
     let finger = clip.skeleton.index_of("mixamorig:LeftHandIndex2").unwrap();
@@ -251,6 +255,66 @@ fn fingers_go_from_their_pose_at_one_keyframe_to_that_at_the_next() {
         way > 0.05 && (half - way / 2.0).abs() < 1e-6,
         "{way} {half}"
     );
+}
+
+#[test]
+fn a_keyframe_that_the_dance_does_not_meet_gives_the_fingers_alone() {
+    let clip = moving(&RIGS[0].body().skeleton, 11);
+    let mapping = Mapping::recognised(&clip).unwrap();
+    let mapped = mapping.apply(&clip).unwrap();
+    let own = Rig {
+        hips: mapping.hips(&clip.skeleton),
+        moves: vec![false; clip.skeleton.len()],
+        turned_as: mapping.turned_as(&clip.skeleton),
+        skeleton: clip.skeleton.clone(),
+    };
+    // The dance stands still; the pose at frame 10 is elsewhere.
+    let mut dance = mapped.clone();
+    dance.poses = vec![mapped.poses[0].clone(); 11];
+    let keyframe = |time: usize, met: bool| RigKeyframe {
+        time,
+        pose: clip.poses[time].clone(),
+        mapped: mapped.poses[time].clone(),
+        met,
+    };
+    let made = |met: bool| onto_rig(&dance, &own, &[keyframe(0, true), keyframe(10, met)]);
+    let turn = |made: &Clip, joint: &str, frame: usize| {
+        let joint = clip.skeleton.index_of(joint).unwrap();
+        let (_, from) = clip.poses[frame].world(&clip.skeleton);
+        let (_, to) = made.poses[10].world(&clip.skeleton);
+        from[joint].angle_between(to[joint])
+    };
+    assert!(turn(&made(true), "mixamorig:LeftArm", 10) < 1e-7);
+    assert!(turn(&made(false), "mixamorig:LeftArm", 0) < 1e-7);
+    let finger = clip.skeleton.index_of("mixamorig:LeftHandIndex2").unwrap();
+    let [there, wanted] = [&made(false).poses[10], &clip.poses[10]];
+    assert!(there.rotations[finger].angle_between(wanted.rotations[finger]) < 1e-7);
+}
+
+#[test]
+fn poses_come_from_another_rest_pose_to_the_same_places() {
+    let config = ChoreographyConfig {
+        clips: 2,
+        frames_per_clip: 60,
+        seed: 5,
+    };
+    for dance in generate(&config).unwrap() {
+        let clip = dance.clip;
+        let directions = rest_directions(&clip.skeleton);
+        let rest = RestPose {
+            skeleton: &clip.skeleton,
+            directions: &directions,
+        };
+        let other = from_another_rest_pose(&clip);
+        assert!(rest.is_of(&clip.skeleton) && !rest.is_of(&other.skeleton));
+        let (stood, poses) = rest.onto(&other.skeleton, &other.poses).unwrap();
+        assert!(rest.is_of(&stood));
+        for (pose, recorded) in poses.iter().zip(&clip.poses) {
+            let places = recorded.world_positions(&clip.skeleton);
+            assert!(farthest(&pose.world_positions(&stood), &places) < 1e-6);
+        }
+        assert!(rest.onto(&other.skeleton, &[]).is_err());
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ use crate::models::rotations::Body;
 use crate::models::{Generator, ModelError, Statistics};
 use crate::motion::Pose;
 use crate::motion::facing::FacingJoints;
+use crate::motion::rest_pose::RestPose;
 use crate::music::FeatureSet;
 
 /// Windows that the network completes in one call. Bounds memory.
@@ -84,6 +85,8 @@ struct Dance<'r> {
     poses: Vec<Pose>,
     /// What the network said of the frames after the seed, in the world.
     raw: Vec<Vec<f64>>,
+    /// First frames of what was made of each window.
+    pieces: Vec<usize>,
 }
 
 impl TrainedPu2022 {
@@ -165,6 +168,7 @@ impl TrainedPu2022 {
             keys,
             poses,
             raw: Vec::new(),
+            pieces: Vec::new(),
         })
     }
 
@@ -229,6 +233,7 @@ impl TrainedPu2022 {
             _ => window.generated(),
         };
         let kept = kept.min(dance.request.frames - from);
+        dance.pieces.push(from);
         for numbers in &said[..kept] {
             let world = frame.to_world(numbers);
             let pose = pose_of(&world, &dance.poses[from - 1]);
@@ -244,6 +249,7 @@ impl Dance<'_> {
             request,
             poses,
             raw,
+            pieces,
             ..
         } = self;
         let world = request.skeleton.world_positions(&poses);
@@ -257,6 +263,7 @@ impl Dance<'_> {
         Motion {
             poses: Some(poses),
             raw: Some(rows),
+            pieces,
             ..Motion::new(positions)
         }
     }
@@ -280,6 +287,10 @@ impl Generator for TrainedPu2022 {
 
     fn music_features(&self) -> FeatureSet {
         self.reference.features
+    }
+
+    fn rest_pose(&self) -> Option<RestPose<'_>> {
+        self.reference.body.rest_pose()
     }
 
     fn generate(&self, requests: &[Request]) -> Result<Vec<Motion>, ModelError> {

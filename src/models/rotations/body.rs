@@ -5,7 +5,7 @@ use ndarray::{ArrayD, IxDyn};
 
 use crate::models::weights::{SavedWeights, WeightsError};
 use crate::models::{ModelError, Statistics};
-use crate::motion::rest_pose::{other_rest_pose, rest_directions};
+use crate::motion::rest_pose::{RestPose, other_rest_pose, rest_directions};
 use crate::motion::{Joint, Skeleton};
 
 const PARENTS: &str = "skeleton.parents";
@@ -71,6 +71,14 @@ impl Body {
             .iter()
             .map(|joint| joint.parent)
             .collect()
+    }
+
+    /// Where bones point at rest; none where weights of an earlier version do not tell.
+    pub fn rest_pose(&self) -> Option<RestPose<'_>> {
+        (!self.directions.is_empty()).then_some(RestPose {
+            skeleton: &self.skeleton,
+            directions: &self.directions,
+        })
     }
 
     /// Refuses a skeleton with other joints or another rest pose; `name` is what an error calls it.

@@ -13,6 +13,9 @@ pub struct RigKeyframe {
     pub pose: Pose,
     /// The same on the dance skeleton: a dance may have it elsewhere.
     pub mapped: Pose,
+    /// Whether the dance passes through it, so that the motion is to have this very pose; else it
+    /// tells of what the dance lacks alone.
+    pub met: bool,
 }
 
 /// A rig, and what of it stands for the dance skeleton.
@@ -27,8 +30,8 @@ pub struct Rig {
     pub moves: Vec<bool>,
 }
 
-/// A dance on a rig: at the keyframes (at least one, by time) the rig's own poses, whole; between
-/// them
+/// A dance on a rig: at the keyframes that it meets (at least one keyframe, by time) the rig's own
+/// poses, whole; between them
 ///
 /// - a joint that stands for one of the dance's has its world rotation, but for the difference that
 ///   there is at the keyframes, where bones stretch, say;
@@ -98,7 +101,11 @@ impl Rig {
     }
 
     fn anchor(&self, dance: &Clip, keyframe: &RigKeyframe) -> Anchor {
-        let (_, dance_rotations) = dance.poses[keyframe.time].world(&dance.skeleton);
+        let counterpart = match keyframe.met {
+            true => &dance.poses[keyframe.time],
+            false => &keyframe.mapped,
+        };
+        let (_, dance_rotations) = counterpart.world(&dance.skeleton);
         let (positions, rotations) = keyframe.pose.world(&self.skeleton);
         let turns = self.turned_as.iter().zip(&rotations);
         let turn = |(counterpart, own): (&Option<usize>, &DQuat)| {
