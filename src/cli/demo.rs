@@ -11,6 +11,7 @@ use clap::Args;
 
 use super::notice::notice;
 use super::progress::Progress;
+use super::stop::{Stop, command, interrupted};
 use super::threads::Threads;
 use super::watched::evaluate_watched;
 use crate::counted::counted;
@@ -19,7 +20,7 @@ use crate::models::Generator;
 use crate::report::demo::{self, Demo, DemoOptions, Losses};
 use crate::report::thousands;
 use crate::run::RunFolder;
-use crate::training::Trainer;
+use crate::training::{Outcome, Trainer};
 
 /// Exit code of a demo whose model misses the goal.
 const MISSED: u8 = 4;
@@ -69,20 +70,28 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     });
     let mut out = std::io::stdout();
     demo::check_folder(&folder)?;
+    let stop = Stop::on_signal(format!("stopped; begin anew with\n  {}", command()))?;
     let run = RunFolder::replace(&folder, config)?;
     demo::begin_results(run.path(), demo)?;
 
     let dataset = demo.dataset()?;
     writeln!(out, "{}", demo::summary(demo, &dataset))?;
-    let (untrained, losses) = train(demo, &dataset, args.threads.count(), &run)?;
+    let trained = train(demo, &dataset, args.threads.count(), &run, &stop)?;
+    let Some((untrained, losses)) = trained else {
+        return Ok(interrupted(&stop.farewell));
+    };
     demo::write_losses(run.path(), &losses)?;
 
     let (model, pool) = (run.trained_model(config)?, args.threads.pool()?);
     let models = (untrained, &*model);
-    let (tables, verdict) = demo::compare(demo, &dataset, &run, models, |protocol, model| {
-        let part = DataPart::Test;
-        pool.install(|| evaluate_watched(protocol, model, &dataset, part, true, None))
-    })?;
+    let compared = demo::compare(demo, &dataset, &run, models, |protocol, model| {
+        let (part, stop) = (DataPart::Test, Some(&stop));
+        pool.install(|| evaluate_watched(protocol, model, &dataset, part, true, stop))
+    });
+    let (tables, verdict) = match compared {
+        Err(_) if stop.is_asked() => return Ok(interrupted(&stop.farewell)),
+        compared => compared?,
+    };
     write!(out, "\n{tables}\n")?;
     writeln!(out, "{}", demo.show(&*model, &dataset, run.path())?)?;
     let seconds = begun.elapsed().as_secs_f64();
@@ -96,13 +105,14 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Trains to the end of the schedule and shows the progress on stderr. The model with its initial
-/// weights, and the losses.
+/// weights, and the losses; none where it was stopped.
 fn train(
     demo: &dyn Demo,
     dataset: &Dataset,
     threads: usize,
     run: &RunFolder,
-) -> anyhow::Result<(Box<dyn Generator>, Losses)> {
+    stop: &Stop,
+) -> anyhow::Result<Option<(Box<dyn Generator>, Losses)>> {
     let mut trainer = Trainer::new(demo.experiment().clone(), dataset, threads)?;
     writeln!(
         std::io::stdout(),
@@ -119,9 +129,11 @@ fn train(
     let outcome = trainer.run(Some(run), &mut |report| {
         progress.step(report);
         losses.add(report);
-        ControlFlow::Continue(())
+        match stop.is_asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     });
     drop(progress);
-    outcome?;
-    Ok((untrained, losses))
+    Ok((outcome? == Outcome::Finished).then_some((untrained, losses)))
 }

@@ -4,29 +4,30 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
+use anyhow::bail;
 use clap::Args;
 
+use super::list::name;
 use super::notice::warn;
 use super::threads::Threads;
 use crate::data::Dataset;
 use crate::experiment::EvaluatedRun;
-use crate::report::figures::{FigureRequest, drawing_of};
+use crate::report::figures::{FigureRequest, drawing_of, write_all};
 use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
 /// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al., 4
 /// to 9 of Pu and Shan, 3 of Valle-Pérez et al.
 ///
-/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition
-/// of a test clip: by default the one in the middle of the first clip by name. Captions and CSV
-/// files give means over such a transition of every test clip that is long enough. A model of
-/// Pan et al. follows a control where it gives at least a third of the change that is asked
-/// for; the captions of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al.
-/// need the rows mix_embedding and slerp, position_loss and contact_loss beside the model.
-/// Figures 5 and 6 of Pu and Shan are over evaluated rows, figure 7 is of the model's own
-/// scores; figures 8 and 9 show the beginning of the first test clip by name. Figure 3 of
-/// Valle-Pérez et al. shows the tempi of a test clip's song and of dances to it by the model
-/// and those of --compare. Motion is shown as the model predicts it, neither bent onto the
-/// keyframes nor cleaned up.
+/// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
+/// test clip, or of each that --clip names: by default the one in the middle of the first. Captions
+/// and CSV files give means over such a transition of every test clip that is long enough. A model
+/// of Pan et al. follows a control where it gives at least a third of the change that is asked for;
+/// the captions of figures 6 to 9 say so where it does not. Figures 3 and 4 of Li et al. need the
+/// rows mix_embedding and slerp, position_loss and contact_loss beside the model. Figures 5 and 6
+/// of Pu and Shan are over evaluated rows, figure 7 is of the model's own scores; figures 8 and 9
+/// show the beginning of the first test clip by name. Figure 3 of Valle-Pérez et al. shows the
+/// tempi of a test clip's song and of dances to it by the model and those of --compare. Motion is
+/// shown as the model predicts it, neither bent onto the keyframes nor cleaned up.
 #[derive(Debug, Args)]
 pub struct FiguresArgs {
     /// Folder of a run, or the config of a model that needs no training
@@ -46,9 +47,10 @@ pub struct FiguresArgs {
     /// Shan
     #[arg(long, value_name = "DIR")]
     rows: Option<PathBuf>,
-    /// Test clip to show, by its file name [default: the first by name]
-    #[arg(long, value_name = "NAME")]
-    clip: Option<String>,
+    /// Test clips to show, by their file names; several get a folder each [default: the first by
+    /// name]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
+    clip: Vec<String>,
     /// First keyframe in that clip [default: the transition is in its middle]; first frame of the
     /// dance for Pu and Shan [default: 0]
     #[arg(long, value_name = "FRAME")]
@@ -74,6 +76,12 @@ pub struct FiguresArgs {
 /// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is
 /// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
+    if args.clip.len() > 1 && (args.viewer.is_some() || args.start.is_some()) {
+        bail!(
+            "--viewer and --start are for one clip; --clip names {}",
+            args.clip.len()
+        );
+    }
     let mut subject = Subject::open(&args.run, &[])?;
     let compared = args.compare.iter().map(|path| Subject::open(path, &[]));
     let mut compared = compared.collect::<Result<Vec<_>, _>>()?;
@@ -95,27 +103,37 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         Some(folder) => EvaluatedRun::rows_in(folder, (!args.other_data).then_some(&dataset))?,
         None => Vec::new(),
     };
-    let asked = FigureRequest {
-        subject: &subject,
-        compared: &compared,
-        rows: &rows,
-        dataset: &dataset,
-        length: args.length.map(usize::from),
-        clip: args.clip.as_deref(),
-        start: args.start,
-        page: args.viewer.is_some(),
-    };
-    let drawn = args.threads.pool()?.install(|| draw(&asked))?;
-    drawn.write(&args.out, &asked)?;
-    if let Some((path, page)) = args.viewer.as_ref().zip(drawn.page) {
-        replace_file(path, page)?;
+    let pool = args.threads.pool()?;
+    let mut clips: Vec<Option<&str>> = args.clip.iter().map(|clip| Some(clip.as_str())).collect();
+    if clips.is_empty() {
+        clips.push(None);
     }
+    let mut drawn = Vec::new();
+    for clip in clips {
+        let asked = FigureRequest {
+            subject: &subject,
+            compared: &compared,
+            rows: &rows,
+            dataset: &dataset,
+            length: args.length.map(usize::from),
+            clip,
+            start: args.start,
+            page: args.viewer.is_some(),
+        };
+        drawn.push((asked, pool.install(|| draw(&asked))?));
+    }
+    write_all(&args.out, &drawn)?;
     let mut out = std::io::stdout();
-    for figure in &drawn.figures {
-        writeln!(out, "{}", figure.caption)?;
-    }
-    for sentence in &drawn.left_out {
-        writeln!(out, "{sentence}")?;
+    for (_, drawn) in drawn {
+        if let Some((path, page)) = args.viewer.as_ref().zip(drawn.page) {
+            replace_file(path, page)?;
+        }
+        for figure in &drawn.figures {
+            writeln!(out, "{}", figure.caption)?;
+        }
+        for sentence in &drawn.left_out {
+            writeln!(out, "{sentence}")?;
+        }
     }
     writeln!(out, "{}", args.out.display())?;
     Ok(())

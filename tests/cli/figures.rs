@@ -242,6 +242,40 @@ fn a_window_that_is_not_there_is_named_with_those_that_are() {
 }
 
 #[test]
+fn figures_of_several_clips_lie_in_a_folder_each() {
+    let unknown = figures(&FIXTURE, "run", "never")
+        .args(["--clip", "nobody.bvh"])
+        .output();
+    let unknown = String::from_utf8(unknown.unwrap().stderr).unwrap();
+    let (_, listed) = unknown.trim().rsplit_once(": ").unwrap();
+    let clips: Vec<&str> = listed.split(", ").take(2).collect();
+    assert_eq!(clips.len(), 2, "{unknown}");
+    let mut command = figures(&FIXTURE, "run", "by_clip");
+    command
+        .args(["--clip", &clips.join(", ")])
+        .assert()
+        .success();
+    let index = fs::read_to_string(FIXTURE.path("by_clip/index.md")).unwrap();
+    for clip in clips {
+        let name = clip.strip_suffix(".bvh").unwrap();
+        assert!(
+            index.contains(&format!("[{name}](<{name}/index.md>)")),
+            "{index}"
+        );
+        let folder = FIXTURE.path("by_clip").join(name);
+        let page = fs::read_to_string(folder.join("index.md")).unwrap();
+        assert!(page.contains(&format!("generates for {clip}")), "{page}");
+        assert!(folder.join("figure_8.svg").is_file());
+    }
+    let mut command = figures(&FIXTURE, "run", "never");
+    let output = command
+        .args(["--clip", "a.bvh,b.bvh", "--start", "3"])
+        .assert()
+        .failure();
+    output.stderr(contains("--viewer and --start are for one clip"));
+}
+
+#[test]
 fn other_data_is_refused_unless_it_is_asked_for() {
     let data = TempDir::new().unwrap();
     write_clips(data.path(), 150, 9);

@@ -611,3 +611,27 @@ fn a_training_whose_folder_is_moved_away_says_so_and_goes_on_from_where_it_was_m
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("goes on after step"), "{text}");
 }
+
+#[test]
+fn a_demo_that_is_stopped_says_so_and_how_it_begins_anew() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    let mut child = keydance()
+        .args(["demo", "--threads", "1", "--out"])
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_for_log(&mut child, &out, 0);
+    kill(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    let again = format!(
+        "stopped; begin anew with\n  keydance demo --threads 1 --out {}",
+        out.display()
+    );
+    assert!(text.contains(&again), "{text}");
+    assert_eq!(manifest(&out)["state"], "stopped");
+}

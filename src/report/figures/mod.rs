@@ -25,6 +25,7 @@ use crate::run::{FileError, Subject, replace_file};
 pub type DrawFigures = fn(&FigureRequest<'_>) -> Result<DrawnFigures, ReportError>;
 
 /// What figures are about.
+#[derive(Clone, Copy)]
 pub struct FigureRequest<'a> {
     /// The model that all figures show.
     pub subject: &'a Subject,
@@ -108,6 +109,29 @@ impl DrawnFigures {
         let index = index(&self.figures, &self.left_out, &subject);
         Ok(replace_file(&folder.join("index.md"), index)?)
     }
+}
+
+/// Writes the figures of several test clips, of each into a folder of its name, and a page that
+/// leads there; those of one into the folder itself.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_all(
+    folder: &Path,
+    drawn: &[(FigureRequest<'_>, DrawnFigures)],
+) -> Result<(), ReportError> {
+    if let [(about, figures)] = drawn {
+        return figures.write(folder, about);
+    }
+    let mut text = "# The paper's figures, by test clip\n\n".to_string();
+    for (about, figures) in drawn {
+        let clip = about.clip.unwrap_or_default();
+        let name = Path::new(clip).file_stem().unwrap_or_default();
+        figures.write(&folder.join(name), about)?;
+        let name = name.to_string_lossy();
+        text += &format!("- [{name}](<{name}/index.md>)\n");
+    }
+    Ok(replace_file(&folder.join("index.md"), text)?)
 }
 
 /// A figure and the numbers behind it.
