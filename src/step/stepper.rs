@@ -60,7 +60,11 @@ pub fn pool(threads: usize) -> Result<ThreadPool, StepError> {
 /// Threads and buffers that one step leaves for the next.
 pub struct Stepper {
     pool: ThreadPool,
-    workspaces: Mutex<Vec<Workspace<f32>>>,
+    /// One for each thread: its memory is where the thread is that first wrote it, on machines with
+    /// several places for it.
+    workspaces: Vec<Mutex<Workspace<f32>>>,
+    /// Of shards that meet, and one for what they have in common.
+    of_meeting: Vec<Workspace<f32>>,
     /// One for each shard that a step has had on this rank, zero between steps.
     gradients: Vec<Gradients<f32>>,
     pub together: Together,
@@ -74,7 +78,8 @@ impl Stepper {
     pub fn new(threads: usize) -> Result<Self, StepError> {
         Ok(Self {
             pool: pool(threads)?,
-            workspaces: Mutex::new(Vec::new()),
+            workspaces: (0..threads).map(|_| Mutex::default()).collect(),
+            of_meeting: Vec::new(),
             gradients: Vec::new(),
             together: Together::default(),
             updating: Duration::ZERO,
@@ -137,31 +142,26 @@ impl Stepper {
     ) -> Result<Vec<Losses>, StepError> {
         let gradients = &mut self.gradients[..own.len()];
         let (workspaces, pool) = (&self.workspaces, &self.pool);
-        let free = || workspaces.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(meeting) = meeting_of(input.step) {
-            let mut taken = std::mem::take(&mut *free());
-            taken.resize_with(taken.len().max(own.len() + 1), Workspace::new);
+            let count = self.of_meeting.len().max(own.len() + 1);
+            self.of_meeting.resize_with(count, Workspace::new);
             let place = Place {
-                workspaces: &mut taken[..=own.len()],
+                workspaces: &mut self.of_meeting[..=own.len()],
                 gradients,
                 together: &mut self.together,
                 shards: own,
             };
-            let losses = pool.install(|| run_meeting(input, meeting, parameters, place, false));
-            free().append(&mut taken);
-            return losses;
+            return pool.install(|| run_meeting(input, meeting, parameters, place, false));
         }
         let losses: Vec<Result<Losses, AutogradError>> = pool.install(|| {
             gradients
                 .par_iter_mut()
                 .zip(own)
                 .map(|(gradients, shard)| {
-                    let taken = free().pop();
-                    let mut workspace = taken.unwrap_or_default();
-                    let losses =
-                        run_shard(input, parameters, &mut workspace, shard, gradients, false);
-                    free().push(workspace);
-                    losses
+                    let thread = rayon::current_thread_index().unwrap_or(0);
+                    let workspace = workspaces[thread].lock();
+                    let mut workspace = workspace.unwrap_or_else(PoisonError::into_inner);
+                    run_shard(input, parameters, &mut workspace, shard, gradients, false)
                 })
                 .collect()
         });
