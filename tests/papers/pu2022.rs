@@ -342,13 +342,14 @@ fn a_dance_goes_on_window_by_window_and_joins_at_late_key_poses() {
     assert_eq!(model.needs().poses, NeededPoses::Seed(6));
     assert!(model.needs().reads(Condition::Music));
     let whole = &model
-        .generate(&[request(&data, 100, &[20, 26, 60])])
+        .generate(&[request(&data, 100, &[20, 26, 70])])
         .unwrap()[0];
     let poses = whole.poses.as_ref().unwrap();
     let raw = whole.raw.as_ref().unwrap();
     assert_eq!((poses.len(), raw.dim()), (100, (94, 147)));
     let recorded = &DataPart::Test.of(&data).unwrap()[0].clip.poses;
     assert_eq!(poses[..6], recorded[..6]);
+    assert_eq!(whole.pieces, [6, 27, 51, 71, 95]);
 
     // What comes first does not depend on what is asked for after the window.
     let short = &model.generate(&[request(&data, 30, &[20, 26])]).unwrap()[0];
@@ -376,6 +377,11 @@ fn a_dance_goes_on_window_by_window_and_joins_at_late_key_poses() {
             "{frame}"
         );
     }
+    // A window has half of its frames before a key pose that the one before cannot see.
+    let soon = &model
+        .generate(&[request(&data, 100, &[20, 26, 60])])
+        .unwrap()[0];
+    assert_eq!(soon.pieces, [6, 27, 48, 72, 96]);
 }
 
 #[test]

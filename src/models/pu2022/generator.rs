@@ -74,6 +74,9 @@ pub struct TrainedPu2022 {
     workspaces: Mutex<Vec<Workspace<f32>>>,
 }
 
+/// Frames that a window has before its first key pose, where that is not in the window before it.
+const ROOM: usize = 30;
+
 /// A dance as far as it is made.
 struct Dance<'r> {
     request: &'r Request,
@@ -221,15 +224,24 @@ impl TrainedPu2022 {
         Ok(said.chunks(frames).map(<[Vec<f64>]>::to_vec).collect())
     }
 
-    /// Adds what the network said of the next window to a dance: all of it, or where its last key
-    /// pose lies near the end, the frames up to that one, so that windows join at a known pose.
+    /// Adds what the network said of the next window to a dance: all of it; or where its last key
+    /// pose lies near the end, the frames up to that one, so that windows join at a known pose; or
+    /// where the next key pose would come soon after its end, fewer, so that the next window has
+    /// frames to reach it in.
     fn go_on(&self, dance: &mut Dance<'_>, frame: WindowFrame, said: &[Vec<f64>]) {
         let window = &self.reference.window;
         let from = dance.poses.len();
         let end = from + window.generated();
         let inside = dance.keys.iter().filter(|(at, _)| (from..end).contains(at));
-        let kept = match inside.map(|(at, _)| *at).next_back() {
-            Some(key) if end < dance.request.frames && key + window.seed >= end => key + 1 - from,
+        let last = inside.map(|(at, _)| *at).next_back();
+        let next = dance.keys.iter().map(|(at, _)| *at).find(|at| *at >= end);
+        let room = ROOM.min(window.generated() / 2);
+        let kept = match (last, next) {
+            _ if end >= dance.request.frames => window.generated(),
+            (Some(last), _) if last + window.seed >= end => last + 1 - from,
+            (last, Some(next)) if next < end + room => {
+                (next - room).max(last.map_or(0, |last| last + 1)) - from
+            }
             _ => window.generated(),
         };
         let kept = kept.min(dance.request.frames - from);
