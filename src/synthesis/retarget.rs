@@ -100,7 +100,8 @@ pub(super) fn check_rest(
     skeleton: &Skeleton,
     clip: &str,
 ) -> Result<(), SynthesisError> {
-    match other_rest_pose(&rest_directions(skeleton), &rest_directions(from)) {
+    let (ours, theirs) = (rest_directions(skeleton), rest_directions(from));
+    match other_rest_pose(skeleton, &ours, &theirs) {
         Some((joint, apart)) => Err(SynthesisError::RestPose {
             clip: clip.into(),
             joint: skeleton.joints[joint].name.clone(),

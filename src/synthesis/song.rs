@@ -256,14 +256,6 @@ impl Song {
             on_rig,
         } = files.given(&choice.seed, &choice.key_poses, needed, frames)?;
         notices.append(&mut files.notices);
-        let (last, free) = (needed.saturating_sub(1), needed + NEAR);
-        let near = keys.iter().filter(|(frame, _)| *frame < free);
-        notices.extend(near.map(|(frame, _)| {
-            format!(
-                "the key pose at frame {frame} comes within {NEAR} frames of the seed, whose last \
-                 frame is {last}, so the dance may jerk to it; put it at frame {free} or later"
-            )
-        }));
         let first = files.into_file(choice.seed.file());
         let first = first.ok_or(KeyframeError::None)?;
         let seed = seed.into_iter().enumerate();
@@ -287,6 +279,18 @@ impl Song {
             notices,
             first,
             on_rig,
+        })
+    }
+
+    /// Warnings of key poses so near to the seed that the dance may jerk to them.
+    pub fn near_the_seed(&self) -> impl Iterator<Item = String> {
+        let (last, free) = (self.seed.saturating_sub(1), self.seed + NEAR);
+        let frames = self.keys().map(|given| given.frame as usize);
+        frames.filter(move |frame| *frame < free).map(move |frame| {
+            format!(
+                "the key pose at frame {frame} comes within {NEAR} frames of the seed, whose last \
+                 frame is {last}, so the dance may jerk to it; put it at frame {free} or later"
+            )
         })
     }
 
@@ -435,7 +439,7 @@ impl SongSummary {
         match count {
             0 => "no key poses".into(),
             _ => format!(
-                "{}, joints {mean:.1} cm from them",
+                "{}, joints {mean:.1} cm from them on average",
                 counted(count, "key pose")
             ),
         }
@@ -463,7 +467,8 @@ impl fmt::Display for SongSummary {
         if count > 0 {
             writeln!(
                 f,
-                "seams: {count}, where joints jump by {most:.1} cm at most; eased out"
+                "seams: {count}, at the widest of which joints jump by {most:.1} cm on average; eased \
+                 out"
             )?;
         }
         for KeyPoseMiss {
@@ -474,7 +479,7 @@ impl fmt::Display for SongSummary {
         {
             writeln!(
                 f,
-                "key pose at frame {frame} ({seconds:.2} s): joints {distance:.1} cm from it"
+                "key pose at frame {frame} ({seconds:.2} s): joints {distance:.1} cm from it on average"
             )?;
         }
         Ok(())

@@ -25,7 +25,7 @@ pub(super) struct SongFile {
     pub clip: Clip,
     /// The file's channels, where it was not mapped and every joint turns.
     channels: Option<Vec<Vec<Channel>>>,
-    /// Its rig, where the model dances on another skeleton or from another rest pose.
+    /// Its rig, where the model dances on the dance skeleton.
     rig: Option<OwnRig>,
     /// Its own seconds a frame.
     frame_time: f64,
@@ -93,14 +93,15 @@ impl<'m> SongFiles<'m> {
 
     /// What brings a clip to the model: nothing where it dances on such clips as they are.
     fn mapping_of(&self, clip: &Clip) -> Result<Option<Mapping>, KeyframeError> {
-        let Some(rest) = self.rest else {
+        if self.rest.is_none() {
             return Ok(self.mapping.clone());
-        };
+        }
         let mapping = Mapping::onto_dance_skeleton(clip, self.mapping.as_ref())?;
-        Ok(match mapping {
-            None if !rest.is_of(&clip.skeleton) => Some(Mapping::recognised(clip)?),
-            mapping => mapping.map(|mapping| mapping.into_owned()),
-        })
+        let mapping = mapping.map(|mapping| mapping.into_owned());
+        Ok(Some(match mapping {
+            Some(mapping) => mapping,
+            None => Mapping::recognised(clip)?,
+        }))
     }
 
     fn file(&mut self, path: &Path) -> Result<&SongFile, KeyframeError> {
@@ -126,9 +127,10 @@ impl<'m> SongFiles<'m> {
         let rig = rig.transpose().map_err(unusable(path))?;
         let read = FileReading::of(clip, mapping.as_ref(), &data).map_err(unusable(path))?;
         let clip = read.recording.clip;
+        // The seed's is read first, and the result is on its rig.
         let on_rig = rig
             .as_ref()
-            .filter(|_| !document.skeleton().is_dance_skeleton());
+            .filter(|_| !document.skeleton().is_dance_skeleton() && self.read.is_empty());
         let notices = rate.into_iter().chain(read.notices);
         let notices = notices.chain(on_rig.map(OwnRig::notice));
         let notices = notices.chain(rig.as_ref().and_then(OwnRig::stiff_joints));

@@ -8,7 +8,7 @@ use clap::CommandFactory as _;
 use glam::{DQuat, DVec3};
 use keydance::cli::Cli;
 use keydance::motion::bvh::{self, Axis, Bvh, Channel, channel_layout};
-use keydance::motion::{Clip, DANCE_JOINTS, Mapping};
+use keydance::motion::{Clip, DANCE_JOINTS, Mapping, Recognised};
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -136,6 +136,24 @@ fn a_dance_to_a_song_from_a_seed_of_any_rig_is_on_that_rig_in_its_unit_axis_chan
         assert!((made.frame_time() * FPS - 1.0).abs() < 1e-6);
         assert_eq!(made.frames(), 192);
         let (made, document) = (made.to_clip(), document.to_clip());
+        let arms = ["LeftArm", "RightArm"].map(|joint| {
+            let at = DANCE_JOINTS.iter().position(|it| *it == joint).unwrap();
+            let name = Recognised::of(&document.skeleton).sources[at]
+                .clone()
+                .unwrap();
+            document.skeleton.index_of(&name).unwrap()
+        });
+        let shoulders = made.poses.iter().map(|pose| {
+            let places = pose.world_positions(&made.skeleton);
+            places[arms[0]].distance(places[arms[1]])
+        });
+        let shoulders: Vec<f64> = shoulders.collect();
+        let narrowest = shoulders.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(
+            narrowest > 0.7 * shoulders[0],
+            "{}: {shoulders:?} m",
+            rig.name
+        );
         // The seed has 60 frames at 30 a second; each fourth of the file's is one of them.
         for frame in (0..48).step_by(4) {
             let [a, b] =

@@ -113,7 +113,9 @@ impl Body {
 
     /// Refuses another rest pose than that of the clips that the model was trained on.
     fn check_rest(&self, name: &str, other: &Self) -> Result<(), ModelError> {
-        let Some((at, apart)) = other_rest_pose(&self.directions, &other.directions) else {
+        let Some((at, apart)) =
+            other_rest_pose(&self.skeleton, &self.directions, &other.directions)
+        else {
             return Ok(());
         };
         Err(ModelError::Data {

@@ -62,6 +62,11 @@ impl TrajectoryControls {
         given.then_some(Condition::RootTrajectory)
     }
 
+    /// Whether they move the keyframes themselves.
+    pub fn moves_keyframes(&self) -> bool {
+        self.turn.is_some() || self.scale.is_some()
+    }
+
     /// The request under them, and warnings of keyframes that were moved.
     ///
     /// # Errors

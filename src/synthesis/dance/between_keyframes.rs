@@ -2,7 +2,6 @@
 
 use rand::RngExt as _;
 
-use super::request::left_out;
 use super::{Dance, DanceError, DanceRequest, DanceSummary, MadeSequence, Origin};
 use crate::data::DataConfig;
 use crate::models::Streams;
@@ -72,8 +71,7 @@ pub(super) fn complete(
         )));
     }
     let needs = model.needs();
-    let unread = asked.unread(&needs).into_iter();
-    let mut warnings: Vec<String> = unread.map(left_out).collect();
+    let mut warnings = asked.left_out(&needs);
     let keyframes = ClipKeyframes::read(&asked.keyframes, data)?;
     keyframes.notices().iter().cloned().for_each(&mut *warn);
     let mut drawn = Streams::new(asked.seed).stream("contact_foot", &[]);

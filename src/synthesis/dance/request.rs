@@ -44,9 +44,16 @@ impl DanceRequest {
         let asked = asked.into_iter().flatten();
         asked.filter(|&it| !needs.reads(it)).collect()
     }
-}
 
-/// The warning of a model for which poses alone matter.
-pub(super) fn left_out(condition: Condition) -> String {
-    format!("the model does not read {}: left out", condition.title())
+    /// Warnings of what is asked for in vain of a model for which poses alone matter.
+    pub(super) fn left_out(&self, needs: &Needs) -> Vec<String> {
+        let unread = self.unread(needs).into_iter().map(Condition::title);
+        let moved = self.trajectory.moves_keyframes();
+        let moved =
+            moved.then_some("--turn and --scale, which move keyframes with their trajectory");
+        let in_vain = unread.chain(moved);
+        in_vain
+            .map(|what| format!("the model does not read {what}: left out"))
+            .collect()
+    }
 }

@@ -1,6 +1,5 @@
 //! A dance to a song, from a seed and key poses.
 
-use super::request::left_out;
 use super::{Dance, DanceError, DanceRequest, DanceSummary, Origin};
 use crate::data::DataConfig;
 use crate::music::Cache;
@@ -21,15 +20,18 @@ pub(super) fn make(
     if asked.options.foot_cleanup {
         let what = &subject.what;
         return refused(format!(
-            "--foot-cleanup: {what} says of no foot that it stands"
+            "--foot-cleanup: {what}, does not tell which foot stands, so none can be pinned"
         ));
     }
     let choice = wanted.choice(&asked.keyframes)?;
     let mut song = Song::read(&choice, model, data, &Cache::of_user())?;
     song.request.seed = asked.seed;
-    let unread = asked.unread(&model.needs()).into_iter();
-    unread.map(left_out).for_each(&mut *warn);
-    song.notices.iter().cloned().for_each(warn);
+    asked
+        .left_out(&model.needs())
+        .into_iter()
+        .for_each(&mut *warn);
+    song.notices.iter().cloned().for_each(&mut *warn);
+    song.near_the_seed().for_each(warn);
     let (dance, summary) = song.dance(model, &asked.name)?;
     Ok(Dance {
         document: song.document(&dance)?,
