@@ -1,6 +1,7 @@
 //! `keydance figures`: reads a run's folder and a data folder, writes the paper's figures with
 //! captions and numbers.
 
+use std::collections::HashSet;
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -47,8 +48,8 @@ pub struct FiguresArgs {
     /// Shan
     #[arg(long, value_name = "DIR")]
     rows: Option<PathBuf>,
-    /// Test clips to show, by their file names; several get a folder each [default: the first by
-    /// name]
+    /// Test clips to show, by their file names; several get a folder each, without --viewer and
+    /// --start [default: the first by name]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name)]
     clip: Vec<String>,
     /// First keyframe in that clip [default: the transition is in its middle]; first frame of the
@@ -76,10 +77,13 @@ pub struct FiguresArgs {
 /// A run or the data cannot be used, do not fit each other, or a model fails on them; nothing is
 /// written then. A file cannot be written.
 pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
-    if args.clip.len() > 1 && (args.viewer.is_some() || args.start.is_some()) {
+    let mut names = args.clip;
+    let mut seen = HashSet::new();
+    names.retain(|name| seen.insert(name.clone()));
+    if names.len() > 1 && (args.viewer.is_some() || args.start.is_some()) {
         bail!(
             "--viewer and --start are for one clip; --clip names {}",
-            args.clip.len()
+            names.len()
         );
     }
     let mut subject = Subject::open(&args.run, &[])?;
@@ -104,7 +108,7 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
         None => Vec::new(),
     };
     let pool = args.threads.pool()?;
-    let mut clips: Vec<Option<&str>> = args.clip.iter().map(|clip| Some(clip.as_str())).collect();
+    let mut clips: Vec<Option<&str>> = names.iter().map(|clip| Some(clip.as_str())).collect();
     if clips.is_empty() {
         clips.push(None);
     }
@@ -124,7 +128,11 @@ pub fn run(args: FiguresArgs) -> anyhow::Result<()> {
     }
     write_all(&args.out, &drawn)?;
     let mut out = std::io::stdout();
-    for (_, drawn) in drawn {
+    let several = drawn.len() > 1;
+    for (asked, drawn) in drawn {
+        if let Some(clip) = asked.clip.filter(|_| several) {
+            writeln!(out, "{clip}:")?;
+        }
         if let Some((path, page)) = args.viewer.as_ref().zip(drawn.page) {
             replace_file(path, page)?;
         }

@@ -59,6 +59,8 @@ pub fn run(args: RegenerateArgs) -> anyhow::Result<()> {
         let path = args.out.join(format!("{stem}_{number:03}.bvh"));
         let summary = song.write(&*subject.model, &path)?;
         writeln!(out, "{}  {}", path.display(), summary.about_key_poses())?;
+        let name = path.display();
+        warn(summary.whirl().map(|whirl| format!("{name}: {whirl}")));
     }
     Ok(())
 }

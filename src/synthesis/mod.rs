@@ -26,6 +26,7 @@ mod seams;
 mod sequence;
 pub mod song;
 mod song_files;
+mod stand;
 mod summary;
 mod warning;
 

@@ -11,6 +11,7 @@ use thiserror::Error;
 use super::keyframes::{FileFrom, FileKeyframe, KeyframeChoice, KeyframeError, LONGEST};
 use super::seams::{Seam, ease};
 use super::song_files::{SongFile, SongFiles, SongPoses};
+use super::stand::stand;
 use super::summary::Units;
 use crate::counted::counted;
 use crate::data::DataConfig;
@@ -21,6 +22,9 @@ use crate::motion::fit::RotationFitError;
 use crate::motion::rig::RigKeyframe;
 use crate::motion::{Clip, Mapping, MappingError, Pose, ResampleError};
 use crate::music::{Analysis, Cache, MusicError};
+
+/// The hips of a dancer turn by less than this from one frame to the next, rad.
+const WHIRL: f64 = 0.7;
 
 /// Key poses nearer to the seed than this get a warning, frames.
 const NEAR: usize = 5;
@@ -117,7 +121,7 @@ pub enum SongError {
     )]
     GivenMusic { model: String },
     #[error(
-        "a dance of {} to {song} is shorter than the seed, {}: give a longer song, or a later end",
+        "a dance of {} to {song} is no longer than the seed, {}: give a longer song, or a later end",
         counted(*frames, "frame"),
         counted(*seed, "frame")
     )]
@@ -299,8 +303,8 @@ impl Song {
         self.first.clip.poses.len()
     }
 
-    /// The dance that a model makes of it, as a clip `name`, without the jumps where pieces of it
-    /// meet; and how well it meets its key poses.
+    /// The dance that a model makes of it, as a clip `name`, on the floor of its seed and without
+    /// the jumps where pieces of it meet; and how well it meets its key poses.
     ///
     /// # Errors
     /// The model fails, or gives no rotations.
@@ -324,6 +328,7 @@ impl Song {
             frame_time: self.request.frame_time,
             poses: poses.ok_or_else(no_rotations)?,
         };
+        stand(&clip.skeleton, &mut clip.poses, self.seed);
         let seams = match pieces.is_empty() {
             true => vec![self.seed],
             false => pieces,
@@ -379,6 +384,7 @@ impl Song {
             seed_is_held: self.held,
             key_poses: key_poses.collect(),
             seams,
+            whirls: whirls(clip),
             frames_a_second: 0.0,
             units: Units::from([
                 ("seconds", "s"),
@@ -386,6 +392,7 @@ impl Song {
                 ("metre", "beats/bar"),
                 ("distance", "cm"),
                 ("jump", "cm"),
+                ("turn", "degrees"),
             ]),
         }
     }
@@ -416,10 +423,33 @@ pub struct SongSummary {
     key_poses: Vec<KeyPoseMiss>,
     /// Where pieces meet, and how far the model jumped there before it was eased.
     seams: Vec<Seam>,
+    /// Where the hips turn faster than a dancer's.
+    whirls: Vec<Whirl>,
     /// Frames that were made in a second of the clock: another each time, so no JSON holds it.
     #[serde(skip)]
     frames_a_second: f64,
     units: Units,
+}
+
+/// The hips turn by so much from the frame before.
+#[derive(Debug, Serialize)]
+struct Whirl {
+    frame: usize,
+    turn: f64,
+}
+
+fn whirls(clip: &Clip) -> Vec<Whirl> {
+    let pairs = clip.poses.windows(2).enumerate();
+    let turns = pairs.map(|(index, pair)| Whirl {
+        frame: index + 1,
+        turn: pair[0].rotations[0].angle_between(pair[1].rotations[0]),
+    });
+    let whirls = turns.filter(|whirl| whirl.turn > WHIRL);
+    let in_degrees = |whirl: Whirl| Whirl {
+        turn: whirl.turn.to_degrees(),
+        ..whirl
+    };
+    whirls.map(in_degrees).collect()
 }
 
 #[derive(Debug, Serialize)]
@@ -431,6 +461,23 @@ struct KeyPoseMiss {
 }
 
 impl SongSummary {
+    /// Says where the model turns the hips as no dancer does.
+    pub fn whirl(&self) -> Option<String> {
+        let widest = self
+            .whirls
+            .iter()
+            .max_by(|a, b| a.turn.total_cmp(&b.turn))?;
+        let others = match self.whirls.len() - 1 {
+            0 => String::new(),
+            more => format!(", and by more than 40 at {}", counted(more, "other frame")),
+        };
+        let (turn, frame) = (widest.turn, widest.frame);
+        Some(format!(
+            "the model turns the hips by {turn:.0} degrees at frame {frame}{others}: another seed or \
+             other key poses may do better"
+        ))
+    }
+
     /// How many key poses there are and how far the dance is from them on average.
     pub fn about_key_poses(&self) -> String {
         let count = self.key_poses.len();

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use keydance::motion::Clip;
 use keydance::motion::bvh::{self, Bvh};
+use keydance::motion::{Clip, Pose};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use serde_json::Value;
@@ -161,7 +161,7 @@ fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
     let mut command = FIXTURE.generate(&out);
     command.args(["--until", "10"]);
     let output = command.assert().failure();
-    output.stderr(contains("is shorter than the seed, 20 frames"));
+    output.stderr(contains("is no longer than the seed, 20 frames"));
     assert!(!out.exists());
     let mut command = FIXTURE.generate(&out);
     command.args(["--until", "-5s"]);
@@ -232,6 +232,47 @@ fn a_seed_and_key_poses_from_another_rest_pose_give_a_dance_on_that_rig() {
     }
     let key = &json(&folder.path().join("made.json"))["key_poses"][0];
     assert!(key["distance"].as_f64().unwrap() < 12.0, "{key}");
+}
+
+#[test]
+fn a_dance_of_a_small_body_stands_on_the_floor_of_its_seed() {
+    let folder = TempDir::new().unwrap();
+    let document = bvh::read(&FIXTURE.file(1, "bvh")).unwrap();
+    let mut clip = document.to_clip();
+    clip.skeleton
+        .joints
+        .iter_mut()
+        .for_each(|joint| joint.offset *= 0.7);
+    let places = clip
+        .poses
+        .iter_mut()
+        .flat_map(|pose| &mut pose.translations);
+    places.for_each(|place| *place *= 0.7);
+    let [small, out] = ["small.bvh", "dance.bvh"].map(|name| folder.path().join(name));
+    let written = Bvh::from_clip(&clip, document.channels().to_vec()).unwrap();
+    bvh::write(&small, &written).unwrap();
+    let mut command = FIXTURE.command("generate");
+    command
+        .arg("--music")
+        .arg(FIXTURE.file(0, "wav"))
+        .arg("--out")
+        .arg(&out);
+    command
+        .arg("--seed-motion")
+        .arg(format!("{}:40", small.display()));
+    command.assert().success();
+    let dance = bvh::read(&out).unwrap().to_clip();
+    let floor = |poses: &[Pose]| {
+        let lowest = poses.iter().map(|pose| {
+            let places = pose.world_positions(&dance.skeleton).into_iter();
+            places.map(|place| place.y).fold(f64::INFINITY, f64::min)
+        });
+        let mut heights: Vec<f64> = lowest.collect();
+        heights.sort_by(f64::total_cmp);
+        heights[heights.len() / 10]
+    };
+    let [seed, after] = [floor(&dance.poses[..60]), floor(&dance.poses[80..])];
+    assert!((seed - after).abs() < 3.0, "{seed} {after} cm");
 }
 
 #[test]

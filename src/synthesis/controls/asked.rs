@@ -64,7 +64,8 @@ impl TrajectoryControls {
 
     /// Whether they move the keyframes themselves.
     pub fn moves_keyframes(&self) -> bool {
-        self.turn.is_some() || self.scale.is_some()
+        let turns = self.turn.is_some_and(|turn| turn != 0.0);
+        turns || self.scale.is_some_and(|scale| scale != 1.0)
     }
 
     /// The request under them, and warnings of keyframes that were moved.

@@ -31,8 +31,9 @@ pub(super) fn make(
         .into_iter()
         .for_each(&mut *warn);
     song.notices.iter().cloned().for_each(&mut *warn);
-    song.near_the_seed().for_each(warn);
+    song.near_the_seed().for_each(&mut *warn);
     let (dance, summary) = song.dance(model, &asked.name)?;
+    summary.whirl().into_iter().for_each(warn);
     Ok(Dance {
         document: song.document(&dance)?,
         summary: DanceSummary::Song(summary),
