@@ -77,6 +77,20 @@ fn a_prepared_set_is_the_folder_to_the_bit() {
 }
 
 #[test]
+fn the_same_motion_twice_is_told_where_it_is_prepared() {
+    let (folder, file) = folder();
+    let dances = dances(&folder);
+    std::fs::copy(dances.join("moved.bvh"), dances.join("again.bvh")).unwrap();
+    let again = prepare(&dances, &config(), &file, &mut go_on);
+    let warnings = again.unwrap().unwrap().warnings;
+    let said = "again.bvh and moved.bvh are the same motion";
+    assert!(
+        warnings.iter().any(|warning| warning == said),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn clips_that_stay_in_the_file_have_the_folders_poses_and_sizes() {
     let (folder, file) = folder();
     let read = Dataset::load(&dances(&folder), &config()).unwrap();

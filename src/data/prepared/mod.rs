@@ -38,20 +38,8 @@ const END: usize = 40;
 /// The file cannot be read, is none or damaged, or was prepared otherwise than the config says.
 pub(super) fn load(path: &Path, config: &DataConfig, stays: bool) -> Result<Dataset, DataError> {
     check_motions_alone(config, path, "give the folder")?;
-    let file = Arc::new(PreparedFile::open(path)?);
-    let Contents {
-        preparation,
-        clips,
-        warnings,
-    } = file.contents()?;
-    preparation.check(&Preparation::of(config), path)?;
-    let clips = clips
-        .into_iter()
-        .map(|entry| {
-            let clip = stored(entry, &file)?;
-            Ok((clip.name().to_string(), clip))
-        })
-        .collect::<Result<BTreeMap<_, _>, DataError>>()?;
+    let (contents, clips) = open(path)?;
+    contents.preparation.check(&Preparation::of(config), path)?;
     let origin = format!("the prepared set {}", path.display());
     let mut dataset = match stays {
         true => Dataset::assemble_stored(&clips, &origin, config)?,
@@ -69,8 +57,21 @@ pub(super) fn load(path: &Path, config: &DataConfig, stays: bool) -> Result<Data
             dataset
         }
     };
-    dataset.warnings.splice(0..0, warnings);
+    dataset.warnings.splice(0..0, contents.warnings);
     Ok(dataset)
+}
+
+/// What a prepared set says of itself, and its clips by name.
+fn open(path: &Path) -> Result<(Contents, BTreeMap<String, StoredClip>), DataError> {
+    let file = Arc::new(PreparedFile::open(path)?);
+    let mut contents = file.contents()?;
+    let entries = std::mem::take(&mut contents.clips).into_iter();
+    let clips = entries.map(|entry| {
+        let clip = stored(entry, &file)?;
+        Ok((clip.name().to_string(), clip))
+    });
+    let clips = clips.collect::<Result<_, DataError>>()?;
+    Ok((contents, clips))
 }
 
 /// Whether a file begins as a prepared set does.

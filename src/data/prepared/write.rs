@@ -11,11 +11,13 @@ use sha2::{Digest as _, Sha256};
 
 use super::contents::{Contents, Entry, JointEntry, Preparation};
 use super::stored::{encoded, frames_in_bytes};
-use super::{MAGIC, VERSION, check_motions_alone, is_prepared};
+use super::{MAGIC, VERSION, check_motions_alone, is_prepared, open};
 use crate::data::config::DataConfig;
 use crate::data::dataset::{DataError, ReadClip, read_clip};
 use crate::data::folder::{clip_files, left_out};
 use crate::data::reading::grouped;
+use crate::data::source::ClipSource;
+use crate::data::twins::twins;
 use crate::motion::Clip;
 
 /// Clips that are read at a time, for every thread.
@@ -96,7 +98,10 @@ fn written(
     let mut warnings = writing.notices();
     warnings.extend(left_out(folder));
     let prepared = writing.end(Preparation::of(config), warnings);
-    let prepared = prepared.map_err(unwritable)?;
+    let mut prepared = prepared.map_err(unwritable)?;
+    let (_, clips) = open(partial)?;
+    let twins = twins(clips.values().map(ClipSource::Stored), [])?;
+    prepared.warnings.extend(twins);
     fs::rename(partial, path).map_err(unwritable)?;
     Ok(Some(prepared))
 }
