@@ -3,9 +3,10 @@
 
     train_regenerated.py RUN --data MUSIC_DANCE --out OUT [--count 5] [--threads 1]
 
-What the method of Pu and Shan is for: RUN, a trained run of kind pu2022, makes new dances to the music of
-each training clip (keydance regenerate), which stand beside the recorded ones in OUT/data; OUT/run is
-trained on all of them by RUN's config, and scored on the same test clips. Stopped, it goes on.
+What the method of Pu and Shan is for: RUN, a trained run of kind pu2022, makes new dances to the
+music of each training clip (keydance regenerate), which stand beside the recorded ones in OUT/data;
+OUT/run is trained on all of them by RUN's config, and scored on the same test clips. Stopped, it
+goes on.
 """
 
 import argparse

@@ -30,10 +30,10 @@ pub fn rest_directions(skeleton: &Skeleton) -> Vec<DVec3> {
 /// then no two of them are further from it than this, the sine of an angle.
 const ONE_LINE: f64 = 0.2;
 
-/// The joint whose bone points elsewhere than on the other skeleton, and by how much, rad, where the
-/// two have not the same rest pose: rotations of one mean other poses on the other. What counts of
-/// the bones that lead from one joint to several is how they are turned together: bodies differ in
-/// their shape.
+/// The joint whose bone points elsewhere than on the other skeleton, and by how much, rad, where
+/// the two have not the same rest pose: rotations of one mean other poses on the other. What counts
+/// of the bones that lead from one joint to several is how they are turned together: bodies differ
+/// in their shape.
 ///
 /// Both as [`rest_directions`] gives them, of joints with the parents that `skeleton` has.
 pub fn other_rest_pose(

@@ -291,8 +291,8 @@ impl<'d> Trainer<'d> {
     /// of the config, where it stops and at the end, and then the weights.
     ///
     /// # Errors
-    /// A loss or gradient that is not finite ([`TrainingError::is_divergence`]; the checkpoints stay
-    /// as they are), or a file that cannot be written.
+    /// A loss or gradient that is not finite ([`TrainingError::is_divergence`]; the checkpoints
+    /// stay as they are), or a file that cannot be written.
     pub fn run(
         &mut self,
         out: Option<&RunFolder>,

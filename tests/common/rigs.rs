@@ -385,8 +385,8 @@ fn place_of(joint: &str) -> Option<DVec3> {
     Some(DVec3::new(side * x, y, z))
 }
 
-/// A clip with the same motion from another rest pose, in which all bones but the root's point along
-/// X.
+/// A clip with the same motion from another rest pose, in which all bones but the root's point
+/// along X.
 pub fn from_another_rest_pose(clip: &Clip) -> Clip {
     let joints = &clip.skeleton.joints;
     // Of each joint's frame, before to after; as the bone to its last child asks.
