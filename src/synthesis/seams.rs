@@ -10,7 +10,7 @@ use crate::motion::{Pose, Skeleton};
 pub struct Seam {
     /// First frame of the second.
     pub frame: usize,
-    /// Mean distance of the joints from the frame before, as the model gave them, cm.
+    /// Mean distance of the joints from the frame before, on the seed's floor, not eased yet, cm.
     pub jump: f64,
 }
 

@@ -461,7 +461,8 @@ struct KeyPoseMiss {
 }
 
 impl SongSummary {
-    /// Says where the model turns the hips as no dancer does.
+    /// Says where the hips turn as no dancer's do: as the model made them, or where a wide seam was
+    /// eased in few frames.
     pub fn whirl(&self) -> Option<String> {
         let widest = self
             .whirls
@@ -473,8 +474,8 @@ impl SongSummary {
         };
         let (turn, frame) = (widest.turn, widest.frame);
         Some(format!(
-            "the model turns the hips by {turn:.0} degrees at frame {frame}{others}: another seed or \
-             other key poses may do better"
+            "the hips turn by {turn:.0} degrees at frame {frame}{others}: another seed or other key \
+             poses may do better"
         ))
     }
 
