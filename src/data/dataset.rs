@@ -155,6 +155,15 @@ pub enum DataError {
         #[source]
         source: std::io::Error,
     },
+    #[error(
+        "what is kept of every frame while a model trains does not fit into {folder}: point TMPDIR \
+         to a folder with more room"
+    )]
+    Scratch {
+        folder: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
     #[cfg(feature = "music")]
     #[error(transparent)]
     Music(#[from] crate::music::MusicError),
@@ -166,6 +175,23 @@ pub enum DataError {
     Resample(#[from] ResampleError),
     #[error(transparent)]
     Features(#[from] FeatureError),
+}
+
+/// Whether data is a file, as prepared sets are.
+fn is_set(path: &Path) -> Result<bool, DataError> {
+    // Another error names the folder that is not there.
+    let Ok(metadata) = path.metadata() else {
+        return Ok(false);
+    };
+    match metadata.is_dir() || metadata.is_file() {
+        true => Ok(metadata.is_file()),
+        false => Err(DataError::Prepared {
+            path: path.into(),
+            problem: "it is a pipe or a device: give a folder of BVH files, or the file that \
+                      keydance prepare wrote"
+                .into(),
+        }),
+    }
 }
 
 impl Recording {
@@ -234,7 +260,7 @@ impl Dataset {
     /// # Errors
     /// The folder has no BVH file, a file is bad, or the config does not fit what is there.
     pub fn load(folder: &Path, config: &DataConfig) -> Result<Self, DataError> {
-        if folder.is_file() {
+        if is_set(folder)? {
             return prepared::load(folder, config, false);
         }
         match config.split {
@@ -264,7 +290,7 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::load`].
     pub fn load_to_train(path: &Path, config: &DataConfig) -> Result<Self, DataError> {
-        match path.is_file() {
+        match is_set(path)? {
             true => prepared::load(path, config, true),
             false => Self::load(path, config),
         }

@@ -26,13 +26,23 @@ impl WindowCut {
         self.frames + usize::from(self.strictly)
     }
 
+    /// How many windows clips with these numbers of frames give.
+    pub fn count(&self, clip_frames: &[usize]) -> usize {
+        let of_clip = |&frames: &usize| self.starts(frames).div_ceil(self.every.max(1));
+        clip_frames.iter().map(of_clip).sum()
+    }
+
+    /// Frames of a clip at which a window could start.
+    fn starts(&self, frames: usize) -> usize {
+        (frames + 1).saturating_sub(self.needed())
+    }
+
     /// The windows of clips with these numbers of frames, by clip, then by start; the first starts
     /// at frame 0.
     pub fn windows(&self, clip_frames: &[usize]) -> Vec<Window> {
         let clips = clip_frames.iter().enumerate();
         let windows = clips.flat_map(|(clip, &frames)| {
-            let starts = (frames + 1).saturating_sub(self.needed());
-            let starts = (0..starts).step_by(self.every.max(1));
+            let starts = (0..self.starts(frames)).step_by(self.every.max(1));
             starts.map(move |start| Window { clip, start })
         });
         windows.collect()

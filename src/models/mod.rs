@@ -38,6 +38,8 @@ pub mod pu2022;
 pub mod registry;
 #[cfg(feature = "papers")]
 pub mod rotations;
+#[cfg(feature = "papers")]
+mod scratch;
 pub mod settings;
 mod shards;
 mod statistics;

@@ -24,6 +24,14 @@ impl Foot {
         }
     }
 
+    /// The foot at a place in a label, the left one at any but 0.
+    pub fn at(index: u8) -> Self {
+        match index {
+            0 => Self::Right,
+            _ => Self::Left,
+        }
+    }
+
     /// Its label.
     pub fn one_hot(self) -> [f64; 2] {
         match self {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 
 use crate::generated_data::write_clips;
@@ -84,4 +85,38 @@ fn a_file_that_is_there_is_replaced_only_if_asked_and_never_a_clip() {
     again(&folder.path().join("nowhere/"), &[])
         .failure()
         .stderr(contains("is a folder; name a file in it"));
+}
+
+#[test]
+fn a_command_that_takes_one_clip_says_that_a_prepared_set_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = prepared(folder.path());
+    for (name, out) in [("view", "--out"), ("features", "--npy")] {
+        let mut command = keydance(name);
+        command
+            .arg(&file)
+            .arg(out)
+            .arg(folder.path().join("written"));
+        let says = "expected a BVH file, text that begins with HIERARCHY";
+        command
+            .assert()
+            .failure()
+            .stderr(contains(says).and(contains("KDPOSES")));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_as_data_is_refused_as_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let mut command = keydance("train");
+    command.args(["experiments/demo.toml", "--data"]).arg(&pipe);
+    command.arg("--out").arg(folder.path().join("run"));
+    command
+        .assert()
+        .failure()
+        .stderr(contains("is a pipe or a device"));
 }

@@ -198,6 +198,26 @@ fn one_that_is_stopped_leaves_no_file() {
 }
 
 #[test]
+fn what_a_killed_process_left_is_taken_away_and_what_a_living_one_writes_stays() {
+    let (folder, file) = folder();
+    let beside = |name: &str| folder.path().join(name);
+    let (left, other) = (
+        beside(".dances.prepared.1.partial"),
+        beside(".other.1.partial"),
+    );
+    let living = beside(".dances.prepared.2.partial");
+    for path in [&left, &living, &other] {
+        std::fs::write(path, "frames").unwrap();
+    }
+    let lock = std::fs::File::open(&living).unwrap();
+    lock.try_lock().unwrap();
+    let prepared = prepare(&dances(&folder), &config(), &file, &mut go_on);
+    assert!(prepared.unwrap().is_some());
+    let there = [&left, &living, &other].map(|path| path.exists());
+    assert_eq!(there, [false, true, true]);
+}
+
+#[test]
 fn a_prepared_set_is_not_prepared_again() {
     let (folder, file) = folder();
     let again = prepare(&file, &config(), &folder.path().join("again"), &mut go_on);

@@ -1,15 +1,16 @@
 //! Writes prepared sets.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 
 use super::contents::{Contents, Entry, JointEntry, Preparation};
+use super::partial::Partial;
 use super::stored::{encoded, frames_in_bytes};
 use super::{MAGIC, VERSION, check_motions_alone, is_prepared, open};
 use crate::data::config::DataConfig;
@@ -56,31 +57,11 @@ pub fn prepare(
     let advice = "with data.split = { share = 0.8 } and without music its motions can be prepared";
     check_motions_alone(config, folder, advice)?;
     let files = clip_files(folder)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    // Of this process alone, as another may write to the same place.
-    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
-    let written = written(folder, config, (path, &partial), files, done);
-    if !matches!(written, Ok(Some(_))) {
-        // What is left of it takes room on a full disk.
-        let _ = fs::remove_file(&partial);
-    }
-    written
-}
-
-fn written(
-    folder: &Path,
-    config: &DataConfig,
-    (path, partial): (&Path, &Path),
-    files: BTreeMap<String, PathBuf>,
-    done: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> Result<Option<Prepared>, DataError> {
     let unwritable = |source| DataError::Written {
         path: path.into(),
         source,
     };
-    // A process of this number may have been killed.
-    let _ = fs::remove_file(partial);
-    let file = File::create_new(partial).map_err(unwritable)?;
+    let (partial, file) = Partial::of(path).map_err(unwritable)?;
     let mut writing = Writing::begin(file).map_err(unwritable)?;
     let paths: Vec<_> = files.iter().collect();
     for paths in paths.chunks(AT_ONCE * rayon::current_num_threads()) {
@@ -99,10 +80,10 @@ fn written(
     warnings.extend(left_out(folder));
     let prepared = writing.end(Preparation::of(config), warnings);
     let mut prepared = prepared.map_err(unwritable)?;
-    let (_, clips) = open(partial)?;
+    let (_, clips) = open(partial.path())?;
     let twins = twins(clips.values().map(ClipSource::Stored), [])?;
     prepared.warnings.extend(twins);
-    fs::rename(partial, path).map_err(unwritable)?;
+    partial.become_whole(path).map_err(unwritable)?;
     Ok(Some(prepared))
 }
 

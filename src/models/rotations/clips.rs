@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{GivenWindow, WindowTruth};
 use crate::data::ClipSource;
 use crate::models::forms::{ClipForm, forms};
+use crate::models::scratch::{Place, Scratch};
 use crate::models::transition::{RootFrame, Window};
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
@@ -93,12 +94,14 @@ impl TrainingClip {
 }
 
 /// All forms in which clips are trained, their windows made when they are asked for; the labels of
-/// all frames are in memory.
+/// all frames are kept, as some are drawn along the clip.
 pub(super) struct Forms<'d> {
     recorded: Vec<RecordedClip<'d>>,
     /// `[form][clip]`, the recorded ones first.
     forms: Vec<Vec<LabelledForm>>,
     mirror: bool,
+    /// The foot in contact of every frame, a byte each: its place in a label.
+    contacts: Scratch,
 }
 
 struct RecordedClip<'d> {
@@ -113,7 +116,7 @@ struct RecordedClip<'d> {
 struct LabelledForm {
     form: ClipForm,
     /// The foot in contact, `[frames]`.
-    contacts: Vec<Foot>,
+    contacts: Place,
 }
 
 impl<'d> Forms<'d> {
@@ -129,6 +132,7 @@ impl<'d> Forms<'d> {
         let recorded = clips.into_iter().map(RecordedClip::new);
         let recorded: Vec<RecordedClip<'d>> = recorded.collect::<Result<_, _>>()?;
         let all = forms(augmentation.mirror, &augmentation.tempi);
+        let kept = Scratch::new();
         let labelled = |(index, recorded): (usize, &RecordedClip<'d>)| {
             let whole = recorded.clip.whole();
             let held = ClipSource::Held(whole.map_err(|error| ModelError::data(&error))?);
@@ -138,7 +142,12 @@ impl<'d> Forms<'d> {
                 let stream = streams.stream("contact_foot", &[number as u64, index as u64]);
                 let TrainingClip { contacts, .. } =
                     TrainingClip::new(clip, rule, threshold, stream)?;
-                Ok(LabelledForm { form, contacts })
+                let contacts: Vec<u8> = contacts.iter().map(|foot| foot.index() as u8).collect();
+                let contacts = kept.keep(&contacts);
+                Ok(LabelledForm {
+                    form,
+                    contacts: contacts.map_err(|error| ModelError::data(&error))?,
+                })
             });
             labelled.collect::<Result<Vec<_>, ModelError>>()
         };
@@ -153,6 +162,7 @@ impl<'d> Forms<'d> {
             recorded,
             forms,
             mirror: augmentation.mirror,
+            contacts: kept,
         })
     }
 
@@ -172,9 +182,11 @@ impl<'d> Forms<'d> {
         frames: Range<usize>,
     ) -> Result<TrainingClip, ModelError> {
         let recorded = &self.recorded[clip];
+        let contacts = self.contacts.bytes(*contacts, frames.clone());
+        let contacts = contacts.map_err(|error| ModelError::data(&error))?;
         Ok(TrainingClip {
-            clip: recorded.in_form(&recorded.clip, form, frames.clone())?,
-            contacts: contacts[frames].to_vec(),
+            clip: recorded.in_form(&recorded.clip, form, frames)?,
+            contacts: contacts.into_iter().map(Foot::at).collect(),
             facing: recorded.facing,
         })
     }

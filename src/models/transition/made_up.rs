@@ -15,6 +15,7 @@ use super::training_windows::TrainingWindows;
 use super::{Forcing, Network, RootFrame, Standardisation, Window};
 use crate::autograd::Parameters;
 use crate::data::{ClipSource, DataError};
+use crate::models::scratch::Scratch;
 use crate::models::settings::InitialRng;
 use crate::models::{Generator, ModelError, Statistics, Step, Streams, Task};
 use crate::motion::{
@@ -70,7 +71,12 @@ impl MadeUpTask {
         let recorded = Augmentation::new(1, &AugmentationConfig::default()).forms();
         let clip = ClipSource::Held(Cow::Owned(clip));
         let unreadable = |error: DataError| ModelError::data(&error);
-        let clips = TrainingClips::new(vec![clip], &recorded, FeatureConfig::default());
+        let clips = TrainingClips::new(
+            vec![clip],
+            &recorded,
+            FeatureConfig::default(),
+            Scratch::new(),
+        );
         let clips = clips.map_err(unreadable)?;
         let standardisation = Standardisation::fit_visited(|visit| clips.each(0..1, visit));
         let standardisation = standardisation.map_err(unreadable)?;

@@ -2,8 +2,9 @@
 
 use rand::seq::SliceRandom;
 
+use super::Window;
+use super::windows::{self, windows};
 use super::{ScheduleConfig, ScheduledSamplingConfig};
-use super::{Window, windows};
 use crate::models::streams::Streams;
 
 /// Batch size that [`Schedule::teacher_forcing`] counts steps in, the paper's.
@@ -62,7 +63,7 @@ impl Schedule {
         let available: Vec<usize> = (0..=config.max_len)
             .map(|length| match length {
                 0 => 0,
-                length => windows(clip_frames, length).windows.len(),
+                length => windows::cut(length).count(clip_frames),
             })
             .collect();
         let growth = config.max_len.saturating_sub(config.min_len);

@@ -16,6 +16,7 @@ use super::{Batch, BatchPlan, DataRanges, Forcing, Network, Schedule, Standardis
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::counted::counted;
 use crate::data::{ClipSource, DataError};
+use crate::models::scratch::Scratch;
 use crate::models::settings::TaskSetting;
 use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
 
@@ -51,7 +52,7 @@ impl<'d> TransitionTask<'d> {
         let augmentation = Augmentation::new(clips.len(), &settings.augmentation);
         let unreadable = |error: DataError| ModelError::data(&error);
         let forms = augmentation.forms();
-        let clips = TrainingClips::new(clips, &forms, setting.data.features());
+        let clips = TrainingClips::new(clips, &forms, setting.data.features(), Scratch::new());
         let clips = clips.map_err(unreadable)?;
         let schedule = Schedule::new(&frames, &settings.schedule, setting.streams);
         let longest = frames.iter().copied().max().unwrap_or(0);

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::Window;
 use crate::data::{ClipSource, DataError};
 use crate::models::forms::{ClipForm, Form};
+use crate::models::scratch::{Place, Scratch};
 use crate::motion::facing::{FacingJoints, facing_angles};
 use crate::motion::features::features_facing;
 use crate::motion::mirror::partners;
@@ -18,13 +19,14 @@ use crate::motion::{FeatureConfig, Pose};
 const AT_ONCE: usize = 2;
 
 /// Clips on the dance skeleton in all their forms: clip `i` of form `f` has the number
-/// `f * recorded + i`. Of a form the facing angles are in memory, as these need the whole clip.
+/// `f * recorded + i`. Of a form the facing angles are kept, as these need the whole clip.
 pub(super) struct TrainingClips<'d> {
     recorded: Vec<ClipSource<'d>>,
     forms: Vec<TrainedForm>,
     features: FeatureConfig,
     /// The joint on the body's other side of each.
     partners: Vec<usize>,
+    facing: Scratch,
 }
 
 /// A clip in one form.
@@ -33,7 +35,7 @@ struct TrainedForm {
     of: usize,
     form: ClipForm,
     /// Of every frame, rad, followed along the clip.
-    facing: Vec<f64>,
+    facing: Place,
 }
 
 /// A window, measured.
@@ -54,6 +56,7 @@ impl<'d> TrainingClips<'d> {
         recorded: Vec<ClipSource<'d>>,
         forms: &[Form],
         features: FeatureConfig,
+        facing: Scratch,
     ) -> Result<Self, DataError> {
         for clip in &recorded {
             features.check(clip.name(), clip.skeleton(), clip.frames())?;
@@ -64,6 +67,7 @@ impl<'d> TrainingClips<'d> {
             recorded,
             forms: Vec::new(),
             features,
+            facing,
         };
         let measured: Vec<_> = clips
             .recorded
@@ -97,10 +101,11 @@ impl<'d> TrainingClips<'d> {
         let poses = form.poses(clip, &self.partners, 0..form.frames())?;
         let world = clip.skeleton().world_positions(&poses);
         let sigma = self.features.facing_sigma;
+        let facing = facing_angles(&world, &FacingJoints::DANCE, sigma);
         Ok(TrainedForm {
             of,
             form,
-            facing: facing_angles(&world, &FacingJoints::DANCE, sigma),
+            facing: self.facing.keep_numbers(&facing)?,
         })
     }
 
@@ -116,12 +121,13 @@ impl<'d> TrainingClips<'d> {
         clip: usize,
         frames: Range<usize>,
     ) -> Result<(Array2<f64>, Cow<'_, [Pose]>), DataError> {
-        let TrainedForm { of, form, facing } = &self.forms[clip];
-        let recorded = &self.recorded[*of];
+        let &TrainedForm { of, form, facing } = &self.forms[clip];
+        let recorded = &self.recorded[of];
         let poses = form.poses(recorded, &self.partners, frames.clone())?;
         let world = recorded.skeleton().world_positions(&poses);
         let threshold = self.features.contact_threshold;
-        let features = features_facing(&world, &facing[frames], threshold);
+        let facing = self.facing.numbers(facing, frames)?;
+        let features = features_facing(&world, &facing, threshold);
         Ok((features, poses))
     }
 
@@ -188,12 +194,14 @@ mod tests {
         #[test]
         fn a_window_of_a_form_is_cut_from_the_clip_in_that_form_to_the_bit(
             tempo in 0.5f64..2.0, number in 0usize..8, start in 0usize..30, length in 1usize..5,
+            in_memory in prop::sample::select(vec![0usize, 1 << 20]),
         ) {
             let recorded = clips();
             let sources = recorded.iter().map(|clip| ClipSource::Held(Cow::Borrowed(clip)));
             let features = FeatureConfig::default();
             let forms = forms(true, &[tempo]);
-            let made = TrainingClips::new(sources.collect(), &forms, features).unwrap();
+            let facing = Scratch::holding(in_memory);
+            let made = TrainingClips::new(sources.collect(), &forms, features, facing).unwrap();
             let (form, clip) = (forms[number / 2], number % 2);
             let mut held = recorded[clip].clone();
             if let Some(tempo) = form.tempo {

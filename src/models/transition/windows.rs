@@ -11,15 +11,19 @@ pub struct Windows {
     pub skipped: Vec<usize>,
 }
 
-/// Windows of `transition + 1` frames of clips with these numbers of frames; a window starts every
-/// ceil(0.1 (N + 1)) frames.
-pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
+/// How windows of `transition + 1` frames are cut: one starts every ceil(0.1 (N + 1)) frames.
+pub(super) fn cut(transition: usize) -> WindowCut {
     let frames = transition + 1;
-    let cut = WindowCut {
+    WindowCut {
         frames,
         every: frames.div_ceil(10),
         strictly: false,
-    };
+    }
+}
+
+/// Windows of `transition + 1` frames of clips with these numbers of frames, see [`cut`].
+pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
+    let cut = cut(transition);
     Windows {
         windows: cut.windows(clip_frames),
         skipped: cut.too_short(clip_frames),

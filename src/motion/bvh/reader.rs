@@ -1,5 +1,7 @@
 //! From a file's bytes to a document.
 
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use super::document::{Bvh, JOINTS_PER_CHANNEL};
@@ -9,16 +11,26 @@ use super::rows::motion;
 use super::scanner::Scanner;
 use crate::counted::counted;
 
+/// Bytes in which a file that is no text is recognised, before all of it is read.
+const HEAD: u64 = 512;
+
 /// Reads a BVH file. The document takes the file's name.
 ///
 /// # Errors
 /// The file cannot be read, or it is not BVH: the error names file, line and what was expected.
 pub fn read(path: &Path) -> Result<Bvh, BvhError> {
-    let bytes = std::fs::read(path).map_err(|source| BvhError::Read {
+    let unreadable = |source| BvhError::Read {
         path: path.into(),
         source,
-    })?;
-    let mut document = parse(&bytes, &path.display().to_string())?;
+    };
+    let name = path.display().to_string();
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    let mut head = io::Read::by_ref(&mut file).take(HEAD);
+    head.read_to_end(&mut bytes).map_err(unreadable)?;
+    check_text(&bytes, &name)?;
+    file.read_to_end(&mut bytes).map_err(unreadable)?;
+    let mut document = parse(&bytes, &name)?;
     if let Some(name) = path.file_name() {
         document.name = name.to_string_lossy().into_owned();
     }
@@ -30,6 +42,7 @@ pub fn read(path: &Path) -> Result<Bvh, BvhError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(bytes: &[u8], name: &str) -> Result<Bvh, BvhError> {
+    check_text(bytes, name)?;
     let text = text(bytes, name)?;
     let mut scanner = Scanner::new(name, text);
     let (skeleton, channels) = hierarchy(&mut scanner)?;
@@ -52,6 +65,25 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<Bvh, BvhError> {
         channels,
         frame_time,
         motion,
+    })
+}
+
+/// Refuses what begins as no text does: other programs' binary files, prepared sets.
+fn check_text(bytes: &[u8], name: &str) -> Result<(), BvhError> {
+    let head = &bytes[..bytes.len().min(HEAD as usize)];
+    if !head.iter().any(|byte| *byte < b'\t') {
+        return Ok(());
+    }
+    let readable = head.iter().take_while(|byte| matches!(byte, b' '..=b'~'));
+    let readable: String = readable.map(|&byte| char::from(byte)).collect();
+    Err(BvhError::Syntax {
+        file: name.into(),
+        line: 1,
+        expected: "a BVH file, text that begins with HIERARCHY".into(),
+        found: match readable.is_empty() {
+            true => "bytes that are no text".into(),
+            false => format!("bytes that are no text after {readable:?}"),
+        },
     })
 }
 
