@@ -4,11 +4,53 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
+use super::settings::ValueError;
 use crate::data::{ClipSource, DataError};
 use crate::motion::mirror::mirrored_poses;
 use crate::motion::resample::Resampled;
 use crate::motion::tempo::frames_at_tempo;
 use crate::motion::{Pose, ResampleError};
+
+/// What is trained beside the recorded windows; the papers train nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AugmentationConfig {
+    /// Each window that is trained is with probability 1/2 the one that a mirror shows, see
+    /// [`crate::motion::mirror_image`].
+    pub mirror: bool,
+    /// Each window that is trained is, with the same probability, of the recorded clip or of the
+    /// same clip at one of these tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`];
+    /// of the recorded one where it would be too long for that at this tempo. 16 at most, each from
+    /// 0.25 to 4.
+    pub tempi: Vec<f64>,
+}
+
+impl AugmentationConfig {
+    /// # Errors
+    /// Tempi out of range, or too many.
+    pub fn check(&self) -> Result<(), ValueError> {
+        let tempi = &self.tempi;
+        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
+        ValueError::unless(
+            usable,
+            "augmentation.tempi",
+            format!("{tempi:?}"),
+            "at most 16 tempi from 0.25 to 4",
+        )
+    }
+
+    /// All forms in their order: the recorded one, in the mirror if that is trained, then the same
+    /// at each tempo.
+    pub(super) fn forms(&self) -> Vec<Form> {
+        let tempi = std::iter::once(None).chain(self.tempi.iter().copied().map(Some));
+        let sides = [false, true].into_iter().take(1 + usize::from(self.mirror));
+        tempi
+            .flat_map(|tempo| sides.clone().map(move |mirrored| Form { tempo, mirrored }))
+            .collect()
+    }
+}
 
 /// A form.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,16 +66,6 @@ pub(super) struct ClipForm {
     tempo: Option<Resampled>,
     mirrored: bool,
     frames: usize,
-}
-
-/// All forms in their order: the recorded one, in the mirror if that is trained, then the same at
-/// each tempo.
-pub(super) fn forms(mirror: bool, tempi: &[f64]) -> Vec<Form> {
-    let tempi = std::iter::once(None).chain(tempi.iter().copied().map(Some));
-    let sides = [false, true].into_iter().take(1 + usize::from(mirror));
-    tempi
-        .flat_map(|tempo| sides.clone().map(move |mirrored| Form { tempo, mirrored }))
-        .collect()
 }
 
 impl ClipForm {

@@ -52,6 +52,8 @@ pub mod valleperez2021;
 pub mod watched;
 pub mod weights;
 
+#[cfg(feature = "papers")]
+pub use forms::AugmentationConfig;
 pub use generator::{Generator, ModelError, Motion, Request};
 pub use settings::{ModelKind, ModelSettings, Paper, TaskSetting};
 pub use shards::Shards;

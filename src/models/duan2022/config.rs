@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::Duan2022;
 use crate::autograd::Real;
 use crate::data::DataConfig;
+use crate::models::AugmentationConfig;
 use crate::models::ModelError;
 use crate::models::rotations::{
-    AugmentationConfig, Body, RotationNetwork, RotationSettings, ScheduleConfig, WindowStatistics,
+    Body, RotationNetwork, RotationSettings, ScheduleConfig, WindowStatistics,
 };
 use crate::models::settings::ValueError;
 use crate::models::transition::RootFrame;

@@ -10,9 +10,10 @@ use super::losses::{Scales, constant, joints};
 use super::network::RecurrentNetwork;
 use crate::autograd::{AutogradError, Real, Tape};
 use crate::data::DataConfig;
+use crate::models::AugmentationConfig;
 use crate::models::rotations::{
-    AugmentationConfig, Batch, Body, Prediction, RootSource, RotationNetwork, RotationSettings,
-    ScheduleConfig, WindowStatistics,
+    Batch, Body, Prediction, RootSource, RotationNetwork, RotationSettings, ScheduleConfig,
+    WindowStatistics,
 };
 use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
 use crate::models::transition::RootFrame;

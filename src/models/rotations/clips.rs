@@ -5,28 +5,17 @@ use std::ops::Range;
 
 use rand::RngExt as _;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::{GivenWindow, WindowTruth};
 use crate::data::ClipSource;
-use crate::models::forms::{ClipForm, forms};
+use crate::models::AugmentationConfig;
+use crate::models::forms::ClipForm;
 use crate::models::scratch::{Place, Scratch};
 use crate::models::transition::{RootFrame, Window};
 use crate::models::{ModelError, Streams};
 use crate::motion::facing::FacingJoints;
 use crate::motion::mirror::{mirrored_skeleton, partners};
 use crate::motion::{Clip, ContactRule, Feet, Foot, Pose, Skeleton};
-
-/// What is trained beside the recorded windows; the papers train nothing else.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AugmentationConfig {
-    /// Each window is with probability 1/2 the one that a mirror shows.
-    pub mirror: bool,
-    /// Each window is, with the same probability, of the recorded clip or of the same clip at one
-    /// of these tempi (1.25: a quarter faster). 16 at most, each from 0.25 to 4.
-    pub tempi: Vec<f64>,
-}
 
 /// A clip to train on.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,7 +120,7 @@ impl<'d> Forms<'d> {
     ) -> Result<Self, ModelError> {
         let recorded = clips.into_iter().map(RecordedClip::new);
         let recorded: Vec<RecordedClip<'d>> = recorded.collect::<Result<_, _>>()?;
-        let all = forms(augmentation.mirror, &augmentation.tempi);
+        let all = augmentation.forms();
         let kept = Scratch::new();
         let labelled = |(index, recorded): (usize, &RecordedClip<'d>)| {
             let whole = recorded.clip.whole();

@@ -24,7 +24,7 @@ mod window;
 
 pub use batch::{Batch, Truth};
 pub use body::Body;
-pub use clips::{AugmentationConfig, TrainingClip};
+pub use clips::TrainingClip;
 pub use gradient_check::generated_batch;
 pub use network::{Prediction, RootSource, RotationNetwork};
 pub use schedule::{LengthConfig, Schedule, ScheduleConfig};

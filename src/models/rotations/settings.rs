@@ -11,7 +11,7 @@ use super::gradient_check;
 use super::made_up::MadeUpTask;
 use super::task::RotationTask;
 use super::trained::{Reference, TrainedRotations};
-use super::{AugmentationConfig, Body, RotationNetwork, ScheduleConfig, WindowStatistics};
+use super::{Body, RotationNetwork, ScheduleConfig, WindowStatistics};
 use crate::autograd::check::CheckReport;
 use crate::autograd::{Parameters, Real};
 use crate::data::DataConfig;
@@ -21,7 +21,7 @@ use crate::models::settings::{
 };
 use crate::models::transition::{MADE_UP_FRAMES, RootFrame};
 use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Statistics, Streams, Task};
+use crate::models::{AugmentationConfig, Generator, ModelError, Statistics, Streams, Task};
 use crate::motion::ContactRule;
 use crate::nn::Initialiser;
 
@@ -123,14 +123,7 @@ impl<S: RotationSettings> ModelSettings for S {
 
     fn check(&self, data: &DataConfig) -> Result<(), ValueError> {
         self.schedule().check()?;
-        let tempi = &self.augmentation().tempi;
-        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
-        ValueError::unless(
-            usable,
-            "augmentation.tempi",
-            format!("{tempi:?}"),
-            "at most 16 tempi from 0.25 to 4",
-        )?;
+        self.augmentation().check()?;
         self.check_own(data)
     }
 

@@ -3,18 +3,16 @@
 use rand::RngExt as _;
 
 use super::Window;
-use super::settings::AugmentationConfig;
 use super::task::StepPlan;
-use crate::models::Streams;
-use crate::models::forms::{Form, forms};
+use crate::models::forms::Form;
+use crate::models::{AugmentationConfig, Streams};
 
 /// The forms in which clips are trained, one after the other: all as recorded, in the mirror where
 /// those are trained, then the same at each tempo.
 pub(super) struct Augmentation {
     /// Recorded clips.
     recorded: usize,
-    mirror: bool,
-    tempi: Vec<f64>,
+    config: AugmentationConfig,
 }
 
 impl Augmentation {
@@ -22,18 +20,17 @@ impl Augmentation {
     pub fn new(recorded: usize, config: &AugmentationConfig) -> Self {
         Self {
             recorded,
-            mirror: config.mirror,
-            tempi: config.tempi.clone(),
+            config: config.clone(),
         }
     }
 
     /// All forms in their order.
     pub fn forms(&self) -> Vec<Form> {
-        forms(self.mirror, &self.tempi)
+        self.config.forms()
     }
 
     fn sides(&self) -> usize {
-        1 + usize::from(self.mirror)
+        1 + usize::from(self.config.mirror)
     }
 
     /// How many of the clips in all forms, from the first on, are at the recorded tempo.
@@ -53,11 +50,11 @@ impl Augmentation {
             streams.stream("mirroring", &[step]),
         );
         for (window, length) in windows.chain(single_frames) {
-            if !self.tempi.is_empty() {
-                let tempo = tempi.random_range(0..=self.tempi.len());
+            if !self.config.tempi.is_empty() {
+                let tempo = tempi.random_range(0..=self.config.tempi.len());
                 *window = self.at_tempo(*window, length, tempo, frames);
             }
-            if self.mirror && sides.random() {
+            if self.config.mirror && sides.random() {
                 window.clip += self.recorded;
             }
         }

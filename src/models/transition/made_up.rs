@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use rand::{RngExt as _, SeedableRng as _};
 
 use super::augmentation::Augmentation;
-use super::settings::{AugmentationConfig, TransitionSettings};
+use super::settings::TransitionSettings;
 use super::single_frames;
 use super::task::{StepPlan, TransitionStep};
 use super::training_clips::TrainingClips;
@@ -17,7 +17,7 @@ use crate::autograd::Parameters;
 use crate::data::{ClipSource, DataError};
 use crate::models::scratch::Scratch;
 use crate::models::settings::InitialRng;
-use crate::models::{Generator, ModelError, Statistics, Step, Streams, Task};
+use crate::models::{AugmentationConfig, Generator, ModelError, Statistics, Step, Streams, Task};
 use crate::motion::{
     Clip, DANCE_JOINTS, DANCE_PARENTS, FeatureConfig, JOINTS, Joint, Pose, Skeleton,
 };

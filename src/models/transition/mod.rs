@@ -48,9 +48,7 @@ pub use request::{KeyframePose, Transition, TransitionModel, TransitionRequest, 
 pub use root_frame::RootFrame;
 pub(crate) use schedule::parts;
 pub use schedule::{BatchPlan, Schedule};
-pub use settings::{
-    AugmentationConfig, ScheduleConfig, ScheduledSamplingConfig, TransitionSettings,
-};
+pub use settings::{ScheduleConfig, ScheduledSamplingConfig, TransitionSettings};
 pub use standardisation::Standardisation;
 pub use task::TransitionTask;
 pub use trained::TrainedModel;

@@ -20,7 +20,7 @@ use crate::models::settings::{
     GradientCheckOptions, InitialRng, LoadError, ModelSettings, TaskSetting, ValueError,
 };
 use crate::models::weights::SavedWeights;
-use crate::models::{Generator, ModelError, Shards, Streams, Task};
+use crate::models::{AugmentationConfig, Generator, ModelError, Shards, Streams, Task};
 use crate::nn::Initialiser;
 
 /// Longest transition that a schedule may name, frames.
@@ -34,6 +34,7 @@ const LARGEST_BATCH: usize = 65_536;
 pub struct TransitionSettings {
     pub model: ModelConfig,
     pub schedule: ScheduleConfig,
+    /// The data's statistics are over the clips and their mirror images, without other tempi.
     pub augmentation: AugmentationConfig,
     pub scheduled_sampling: ScheduledSamplingConfig,
 }
@@ -82,21 +83,6 @@ impl Default for ScheduleConfig {
     }
 }
 
-/// What is trained beside the recorded windows; the paper trains nothing else.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AugmentationConfig {
-    /// Each window that is trained is with probability 1/2 the one that a mirror shows, see
-    /// [`crate::motion::mirror_image`]; the statistics of the data are over the clips and their
-    /// images.
-    pub mirror: bool,
-    /// Each window that is trained is, with the same probability, of the recorded clip or of the
-    /// same clip at one of these tempi (1.25: a quarter faster), see [`crate::motion::at_tempo`];
-    /// of the recorded one where it would be too long for that at this tempo. The statistics of the
-    /// data leave them out. 16 at most, each from 0.25 to 4.
-    pub tempi: Vec<f64>,
-}
-
 /// Scheduled sampling: one draw a batch, ground truth is fed with probability beta.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -125,15 +111,7 @@ impl ModelSettings for TransitionSettings {
         self.schedule.check()?;
         let decay = self.scheduled_sampling.decay;
         ValueError::unless(is_share(decay), "scheduled_sampling.decay", decay, SHARE)?;
-        let tempi = &self.augmentation.tempi;
-        let usable = tempi.len() <= 16 && tempi.iter().all(|tempo| (0.25..=4.0).contains(tempo));
-        let value = format!("{tempi:?}");
-        ValueError::unless(
-            usable,
-            "augmentation.tempi",
-            value,
-            "at most 16 tempi from 0.25 to 4",
-        )?;
+        self.augmentation.check()?;
         self.model.check(data)
     }
 

@@ -174,7 +174,7 @@ mod tests {
 
     use super::*;
     use crate::data::choreography::{ChoreographyConfig, generate};
-    use crate::models::forms::forms;
+    use crate::models::AugmentationConfig;
     use crate::models::transition::DanceClip;
     use crate::motion::{Clip, at_tempo, mirror_image};
 
@@ -199,7 +199,7 @@ mod tests {
             let recorded = clips();
             let sources = recorded.iter().map(|clip| ClipSource::Held(Cow::Borrowed(clip)));
             let features = FeatureConfig::default();
-            let forms = forms(true, &[tempo]);
+            let forms = AugmentationConfig { mirror: true, tempi: vec![tempo] }.forms();
             let facing = Scratch::holding(in_memory);
             let made = TrainingClips::new(sources.collect(), &forms, features, facing).unwrap();
             let (form, clip) = (forms[number / 2], number % 2);
