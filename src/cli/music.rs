@@ -59,7 +59,7 @@ pub fn run(args: MusicArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.npy {
         let array = heard.analysis.features(args.features);
         let mut content = Vec::new();
-        array.write_npy(&mut content)?;
+        array.as_standard_layout().write_npy(&mut content)?;
         replace_file(path, content)?;
         let (frames, numbers) = array.dim();
         let columns = args.features.columns();

@@ -67,11 +67,12 @@ const OTHERS: [(usize, &[u8], &str); 24] = [
     (0, b"\x93NUMPY", "a .npy array"),
 ];
 
-/// The format of a file, or what else it seems to be. Leaves the position where it may.
+/// The format of a file that begins at `start`, or what else it seems to be. Leaves the position
+/// where it may.
 pub(super) fn recognise(
     file: &mut (impl Read + Seek),
+    start: u64,
 ) -> io::Result<Result<Container, &'static str>> {
-    let start = behind_tags(file)?;
     let mut head = Vec::new();
     file.seek(SeekFrom::Start(start))?;
     file.take(LOOK).read_to_end(&mut head)?;
@@ -105,7 +106,7 @@ pub(super) fn recognise(
 }
 
 /// Where the file begins behind ID3 tags, which any format may have in front.
-fn behind_tags(file: &mut (impl Read + Seek)) -> io::Result<u64> {
+pub(super) fn behind_tags(file: &mut (impl Read + Seek)) -> io::Result<u64> {
     let mut start = 0;
     loop {
         let mut tag = Vec::new();

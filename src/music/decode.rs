@@ -1,7 +1,7 @@
 //! Sound files decoded: wav, flac, mp3 and ogg (Vorbis), any channels and rate.
 
 use std::fs::File;
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, Read as _, SeekFrom};
 use std::path::Path;
 
 use symphonia::core::codecs::audio::{AudioDecoder, AudioDecoderOptions};
@@ -12,9 +12,11 @@ use symphonia::core::io::{MediaSource, MediaSourceStream, ReadOnlySource};
 use symphonia::core::meta::MetadataOptions;
 use symphonia::core::packet::Packet;
 
-use super::container::{Container, recognise};
+use super::behind::Behind;
+use super::container::{Container, behind_tags, recognise};
 use super::error::MusicError;
 use super::resample::Resampler;
+use super::riff::mended;
 use super::sound::Sound;
 use crate::counted::counted;
 
@@ -92,14 +94,35 @@ fn decode(mut source: impl MediaSource + 'static, file: &str) -> Result<Sound, F
     if bytes == 0 {
         return Err(MusicError::Empty { file: file() }.into());
     }
-    let container =
-        recognise(&mut source)?.map_err(|what| MusicError::OtherFormat { file: file(), what })?;
-    source.rewind()?;
+    let start = behind_tags(&mut source)?;
+    let container = recognise(&mut source, start)?;
+    let container = container.map_err(|what| MusicError::OtherFormat { file: file(), what })?;
+    let mended = match container {
+        Container::Wav => mended(&mut source, start)?,
+        _ => None,
+    };
+    if let Some(header) = mended {
+        source.seek(SeekFrom::Start(header.samples))?;
+        let source = ReadOnlySource::new(Cursor::new(header.bytes).chain(source));
+        return decode_stream(Box::new(source), container, file(), bytes);
+    }
+    let source = Behind::new(source, start)?;
     let source: Box<dyn MediaSource> = match container {
         // Where the source has a length, symphonia guesses the sound's and cuts what is beyond.
         Container::Mp3 { has_length: false } => Box::new(ReadOnlySource::new(source)),
         _ => Box::new(source),
     };
+    decode_stream(source, container, file(), bytes)
+}
+
+/// Decodes what begins with a sound's own first byte; `bytes` are those of the file.
+fn decode_stream(
+    source: Box<dyn MediaSource>,
+    container: Container,
+    name: String,
+    bytes: u64,
+) -> Result<Sound, Failure> {
+    let file = || name.clone();
     let stream = MediaSourceStream::new(source, Default::default());
     let (options, metadata) = (FormatOptions::default(), MetadataOptions::default());
     let probe = symphonia::default::get_probe();

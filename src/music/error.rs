@@ -24,7 +24,7 @@ pub enum MusicError {
     Empty { file: String },
     /// The content is none of the formats, whatever the name's ending says.
     #[error(
-        "{file} is {what}, not wav, flac, mp3 or ogg; where it is music, `ffmpeg -i {file} \
+        "{file} is {what}, not wav, flac, mp3 or ogg; where it is music, `ffmpeg -i \"{file}\" \
          music.flac` converts it (not a protected one)"
     )]
     OtherFormat { file: String, what: &'static str },
@@ -32,7 +32,7 @@ pub enum MusicError {
     Damaged { file: String, problem: String },
     #[error(
         "{file} is {container} with sound that keydance does not decode ({problem}); `ffmpeg -i \
-         {file} music.flac` converts it"
+         \"{file}\" music.flac` converts it"
     )]
     Codec {
         file: String,

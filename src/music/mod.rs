@@ -30,6 +30,7 @@
 
 pub mod analysis;
 pub mod beats;
+mod behind;
 pub mod cache;
 pub mod chroma;
 mod container;
@@ -42,6 +43,7 @@ pub mod mfcc;
 pub mod onset;
 pub mod peaks;
 mod resample;
+mod riff;
 pub mod sound;
 pub mod spectrum;
 mod summary;

@@ -255,6 +255,78 @@ fn a_file_that_is_cut_off_is_used_as_far_as_it_goes_with_a_warning_of_both_lengt
     );
 }
 
+/// An ID3v2.4 tag around a frame of other bytes.
+fn tagged(content: &[u8], sound: &[u8]) -> Vec<u8> {
+    let seven_bits = |size: usize| [21, 14, 7, 0].map(|shift| (size >> shift) as u8 & 0x7f);
+    let mut file = b"ID3\x04\0\0".to_vec();
+    file.extend(seven_bits(content.len() + 10));
+    file.extend(b"APIC");
+    file.extend(seven_bits(content.len()));
+    file.extend([0; 2]);
+    file.extend(content);
+    file.extend(sound);
+    file
+}
+
+#[test]
+fn what_a_tag_holds_is_not_heard_however_large_it_is() {
+    let picture = vec![b'x'; 1_500_000];
+    let text = b"fLaC OggS RIFF".to_vec();
+    let other = wav(&noise(3_000), 1, RATE);
+    for ending in ["mp3", "flac", "ogg", "wav"] {
+        let sound = match ending {
+            "wav" => wav(&noise(4_410), 1, RATE),
+            ending => encoded(ending),
+        };
+        let plain = parse(&sound, "plain").unwrap();
+        for content in [&picture, &text, &encoded("mp3"), &other] {
+            let heard = parse(&tagged(content, &sound), "tagged").unwrap();
+            assert_eq!(heard.samples(), plain.samples(), "{ending}");
+            assert_eq!(heard.warnings(), plain.warnings(), "{ending}");
+        }
+    }
+}
+
+#[test]
+fn wav_files_whose_chunks_are_not_as_they_should_be_are_heard_whole() {
+    let samples = noise(3_000);
+    let whole = wav(&samples, 1, RATE);
+    let expected = parse(&whole, "whole.wav").unwrap();
+    let with = |chunk: &[u8]| {
+        let mut file = whole.clone();
+        file.splice(36..36, chunk.iter().copied());
+        file
+    };
+    let set = |at: usize, length: u32| {
+        let mut file = whole.clone();
+        file[at..at + 4].copy_from_slice(&length.to_le_bytes());
+        file
+    };
+    for (what, file) in [
+        (
+            "a list without the byte that fills it up",
+            with(b"LIST\x05\0\0\0INFOx"),
+        ),
+        ("an empty list", with(b"LIST\0\0\0\0")),
+        (
+            "a name without the byte that fills it up",
+            with(b"note\x03\0\0\0abc"),
+        ),
+        ("a whole that is too short", set(4, 1_000)),
+        ("a whole of nothing", set(4, 0)),
+        ("samples whose length was never written", set(40, 0)),
+    ] {
+        let heard = parse(&file, "odd.wav").unwrap();
+        assert_eq!(heard.samples(), expected.samples(), "{what}");
+        assert_eq!(heard.warnings(), Vec::<String>::new(), "{what}");
+    }
+    // Nothing is there but a list behind it.
+    let mut empty = wav(&[], 1, RATE);
+    empty.extend(b"LIST\x04\0\0\0INFO");
+    let error = parse(&empty, "empty.wav").unwrap_err().to_string();
+    assert!(error.contains("it holds no sample"), "{error}");
+}
+
 #[test]
 fn what_is_no_sound_file_is_named() {
     let cases: [(&[u8], &str); 10] = [
