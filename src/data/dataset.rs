@@ -502,7 +502,9 @@ pub(super) fn read_clip(
     })?;
     let mut clip = bvh::parse(&bytes, &path.display().to_string())?.to_clip();
     clip.name = name.into();
-    let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
+    let FileReading {
+        recording, notices, ..
+    } = FileReading::of(clip, mapping, config)?;
     Ok(ReadClip {
         recording,
         digest: file_digest(&bytes),

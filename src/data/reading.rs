@@ -4,9 +4,8 @@
 use super::config::DataConfig;
 use super::dataset::{DataError, Recording};
 use crate::counted::counted;
-use crate::motion::frame_rate::meant_rate;
+use crate::motion::frame_rate::{is_whole, meant_rate};
 use crate::motion::oddities::{oddities, swapped_sides};
-use crate::motion::units::to_cm_and_y_up;
 use crate::motion::{Clip, Conversion, Mapping, Unit, Up, resample};
 
 /// How many clips a warning names.
@@ -17,6 +16,8 @@ const NAMED: usize = 3;
 pub struct FileReading {
     /// In cm, with Y up, at the config's rate.
     pub recording: Recording,
+    /// How it was brought there beside what a mapping does.
+    pub conversion: Conversion,
     /// What is odd about the file, and what of it was recognised and converted, a sentence each.
     pub notices: Vec<String>,
 }
@@ -41,10 +42,13 @@ impl FileReading {
             Some(mapping) => undeclared(mapping, config)?,
             None => (config.unit, config.up),
         };
-        notices.extend(to_cm_and_y_up(&mut clip, unit, up));
+        let (conversion, recognised) = Conversion::of(&clip, unit, up);
+        conversion.apply(&mut clip);
+        notices.extend(recognised);
         notices.extend(mapping.and_then(|_| swapped_sides(&clip)));
         Ok(Self {
             recording: Recording::of(clip),
+            conversion,
             notices,
         })
     }
@@ -91,13 +95,18 @@ impl RigReading {
 /// # Errors
 /// The declared rate is none, or the clip has too few frames.
 pub fn at_its_rate(mut clip: Clip, config: &DataConfig) -> Result<(Clip, Vec<String>), DataError> {
-    let notice = set_rate(&mut clip, config.source_fps)?;
+    let notice = set_rate(&mut clip, config.source_fps, config.fps)?;
     skip_frames(&mut clip, config.skip_frames)?;
     Ok((clip, notice.into_iter().collect()))
 }
 
-/// Gives a clip the declared rate, or the one that its frame time rounds.
-fn set_rate(clip: &mut Clip, declared: Option<f64>) -> Result<Option<String>, DataError> {
+/// Gives a clip the declared rate, or the one that its frame time rounds; a notice of that, or of
+/// an odd rate that is brought to `rate`.
+fn set_rate(
+    clip: &mut Clip,
+    declared: Option<f64>,
+    rate: f64,
+) -> Result<Option<String>, DataError> {
     if let Some(fps) = declared {
         if !(fps.is_finite() && fps > 0.0) {
             return Err(DataError::Config {
@@ -110,7 +119,15 @@ fn set_rate(clip: &mut Clip, declared: Option<f64>) -> Result<Option<String>, Da
         return Ok(None);
     }
     let Some(fps) = meant_rate(clip.frame_time) else {
-        return Ok(None);
+        let fps = 1.0 / clip.frame_time;
+        let other = !is_whole(fps) && !is_whole(fps / rate);
+        return Ok(other.then(|| {
+            format!(
+                "the frame time of {} s is {fps:.3} frames a second: frames at {rate} are made \
+                 between its own; data.source_fps in a config gives another rate",
+                clip.frame_time
+            )
+        }));
     };
     let said = clip.frame_time;
     clip.frame_time = 1.0 / fps;

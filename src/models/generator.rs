@@ -116,13 +116,15 @@ pub struct Sampling {
     pub look_ahead: usize,
 }
 
-/// What can be given beside poses.
+/// What can be given beside the poses that a model [needs](NeededPoses).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
     RootTrajectory,
     VelocityFactors,
     Contacts,
     Music,
+    /// Poses behind a seed.
+    KeyPoses,
 }
 
 /// What a model needs of a request, and what else it heeds: help, errors and warnings follow from
@@ -254,6 +256,7 @@ impl Condition {
             Self::VelocityFactors => "velocity factors",
             Self::Contacts => "contacts",
             Self::Music => "music",
+            Self::KeyPoses => "key poses",
         }
     }
 }
@@ -288,6 +291,10 @@ impl Request {
             Condition::VelocityFactors => self.velocity_factors.is_some(),
             Condition::Contacts => self.contacts.is_some(),
             Condition::Music => self.music.is_some(),
+            Condition::KeyPoses => {
+                let frames = self.given.iter().map(|given| given.frame);
+                (0..).zip(frames).any(|(in_seed, frame)| frame != in_seed)
+            }
         }
     }
 

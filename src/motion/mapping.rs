@@ -255,8 +255,9 @@ impl Mapping {
         })
     }
 
-    /// What brings a clip onto the dance skeleton: nothing where it is on it, else the mapping that
-    /// is given, else what is recognised.
+    /// What brings a clip onto the dance skeleton: the mapping that is given, unless the clip is on
+    /// that skeleton and has not the joints that the mapping names; else nothing where it is on it;
+    /// else what is recognised.
     ///
     /// # Errors
     /// As [`Mapping::recognised`].
@@ -265,9 +266,11 @@ impl Mapping {
         given: Option<&'m Self>,
     ) -> Result<Option<Cow<'m, Self>>, MappingError> {
         Ok(match given {
+            Some(mapping) if !clip.skeleton.is_dance_skeleton() || mapping.is_of(clip) => {
+                Some(Cow::Borrowed(mapping))
+            }
             _ if clip.skeleton.is_dance_skeleton() => None,
-            Some(mapping) => Some(Cow::Borrowed(mapping)),
-            None => Some(Cow::Owned(Self::recognised(clip)?)),
+            _ => Some(Cow::Owned(Self::recognised(clip)?)),
         })
     }
 
@@ -296,6 +299,12 @@ impl Mapping {
             up: Up::Auto,
             sources: sources.map(Source::At).collect(),
         })
+    }
+
+    /// Whether a clip has all joints that it names.
+    fn is_of(&self, clip: &Clip) -> bool {
+        let mut sources = self.sources.iter().zip(DANCE_JOINTS);
+        sources.all(|(source, joint)| self.place(source, joint, clip).is_ok())
     }
 
     /// Whether the file declares the clips' unit, by `scale` or `unit`.

@@ -42,7 +42,7 @@ pub use resample::{ResampleError, resample};
 pub use rig::Recognised;
 pub use skeleton::{DANCE_JOINTS, DANCE_PARENTS, JOINTS, Joint, Skeleton};
 pub use tempo::at_tempo;
-pub use units::{Conversion, Measured, Unit, Up};
+pub use units::{Along, Conversion, Measured, Unit, Up};
 pub use velocity_factor::{
     PART_NAMES, PART_WEIGHTS, PARTS, measured_velocity_factors, velocity_factors,
     velocity_factors_between,

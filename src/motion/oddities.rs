@@ -8,10 +8,16 @@ use super::facing::FacingJoints;
 use crate::counted::counted;
 
 /// A step at the beginning is a jump where its fastest joint goes this many times as far as any
-/// joint in any step after it.
+/// joint in any step after the beginning.
 const JUMP: f64 = 2.5;
 /// And at least this share of the body's extent: further than a fist goes in a frame.
 const LEAST_JUMP: f64 = 0.15;
+/// A jump out of a pose that was held takes at most the beginning's part of this number.
+const SMEARING: usize = 4;
+/// Steps behind it belong to it that go this many times as far as any after the beginning.
+const SMEARED: f64 = 1.2;
+/// Nobody dances whose fastest joint goes this share of the body's extent in a frame.
+const STILL: f64 = 0.005;
 /// How long a beginning lasts, s, and the share of a clip that it is at most.
 const BEGINNING: f64 = 1.0;
 const BEGINNING_SHARE: f64 = 0.25;
@@ -95,16 +101,24 @@ fn jump_at_the_beginning(clip: &Clip) -> Option<String> {
         .map(|pair| farthest(&pair[0], &pair[1]))
         .collect();
     let frames = clip.poses.len() as f64;
-    let beginning = (BEGINNING / clip.frame_time).min(BEGINNING_SHARE * frames) as usize;
-    // The largest step after each.
-    let mut later = vec![0.0; steps.len()];
-    for index in (1..steps.len()).rev() {
-        later[index - 1] = f64::max(later[index], steps[index]);
-    }
-    let least = LEAST_JUMP * extent(positions.last()?);
-    let jump = (0..beginning.min(steps.len().saturating_sub(1)))
-        .rev()
-        .find(|&index| steps[index] > least && steps[index] > JUMP * later[index])?;
+    let [short, long] = [BEGINNING / clip.frame_time, f64::INFINITY]
+        .map(|frames_of| frames_of.min(BEGINNING_SHARE * frames) as usize);
+    let extent = extent(positions.last()?);
+    // A first pose may be held for long.
+    let still = steps.iter().take_while(|&&step| step < STILL * extent);
+    let beginning = match still.count() {
+        held if held > short => (held + 1 + short / SMEARING).min(long),
+        _ => short,
+    };
+    // A filter smears the jump over several frames, so none of these may be compared with another.
+    let (first, after) = steps.split_at(beginning.min(steps.len()));
+    let fastest = after.iter().copied().reduce(f64::max)?;
+    let least = (LEAST_JUMP * extent).max(JUMP * fastest);
+    let jump = first.iter().rposition(|&step| step > least)?;
+    let smeared = first[jump + 1..]
+        .iter()
+        .take_while(|&&step| step > SMEARED * fastest);
+    let jump = jump + smeared.count();
     Some(format!(
         "the body jumps from frame {jump} to frame {next} as nowhere after it, which may be a T-pose before the dance; \
          data.skip_frames = {next} in a config leaves the first frames out",

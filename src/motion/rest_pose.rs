@@ -30,13 +30,25 @@ pub fn rest_directions(skeleton: &Skeleton) -> Vec<DVec3> {
 /// then no two of them are further from it than this, the sine of an angle.
 const ONE_LINE: f64 = 0.2;
 
-/// The joint whose bone points elsewhere than on the other skeleton, and by how much, rad, where
-/// the two have not the same rest pose: rotations of one mean other poses on the other. What counts
-/// of the bones that lead from one joint to several is how they are turned together: bodies differ
-/// in their shape.
+/// The joint whose bone points furthest elsewhere than on the other skeleton, and by how much, rad,
+/// where the two have not the same rest pose: rotations of one mean other poses on the other.
 ///
 /// Both as [`rest_directions`] gives them, of joints with the parents that `skeleton` has.
 pub fn other_rest_pose(
+    skeleton: &Skeleton,
+    ours: &[DVec3],
+    theirs: &[DVec3],
+) -> Option<(usize, f64)> {
+    let widest = rest_poses_apart(skeleton, ours, theirs);
+    widest.filter(|(_, apart)| *apart > REST)
+}
+
+/// The joint whose bone points furthest elsewhere than on the other skeleton, and by how much, rad;
+/// none where no bone is known of both. What counts of the bones that lead from one joint to
+/// several is how they are turned together: bodies differ in their shape.
+///
+/// Both as for [`other_rest_pose`].
+pub fn rest_poses_apart(
     skeleton: &Skeleton,
     ours: &[DVec3],
     theirs: &[DVec3],
@@ -57,8 +69,7 @@ pub fn other_rest_pose(
             .map(|joint| (*joint, apart(joint)))
             .collect::<Vec<_>>()
     });
-    let widest = apart.max_by(|(_, one), (_, other)| one.total_cmp(other));
-    widest.filter(|(_, apart)| *apart > REST)
+    apart.max_by(|(_, one), (_, other)| one.total_cmp(other))
 }
 
 fn children(skeleton: &Skeleton, parent: usize) -> impl Iterator<Item = usize> {

@@ -25,6 +25,14 @@ const IN_CM: RangeInclusive<f64> = 95.0..=300.0;
 const STANDS: f64 = 0.8;
 /// Its feet are on the floor within this share of its height.
 const FLOOR: f64 = 0.2;
+/// Who goes about has places with more than this deviation, as a share of the height,
+const FAR: f64 = 0.12;
+/// and heights with less than this share of it.
+const STAYS: f64 = 0.25;
+/// Where the lowest joint of somebody is who lies on the floor, and below what the highest, as
+/// shares of the height.
+const LYING: RangeInclusive<f64> = -0.15..=0.15;
+const LIES: f64 = 0.35;
 
 /// The unit of a file's lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -118,6 +126,8 @@ pub struct Measured {
     pub unit: Option<Unit>,
     /// The axis along which it stands, where it can be told.
     pub up: Option<Up>,
+    /// The axis along which it is in most frames, where that is another one.
+    pub along: Option<Along>,
 }
 
 impl Measured {
@@ -133,10 +143,15 @@ impl Measured {
         // A body whose joints have all collapsed into one has its offsets left.
         let length = Some(moved).filter(|&length| length > 0.0);
         let height = WHOLE_BODY * length.unwrap_or_else(|| body.length(&rest));
+        if height == 0.0 {
+            return Self::default();
+        }
+        let (up, along) = body.up(&clip.skeleton, &rest, &sampled, height);
         Self {
             height: Some(height),
             unit: unit_of(height),
-            up: body.up(&clip.skeleton, &rest, &sampled, height),
+            up,
+            along,
         }
     }
 }
@@ -189,6 +204,24 @@ impl Conversion {
                 "the body stands along Z: turned so that Y is up; another axis can be declared";
             notices.push(done.into());
         }
+        if up == Up::Auto
+            && let Some(along) = measured.along
+        {
+            notices.push(format!(
+                "the body lies along {along} in most frames, or that is up: taken with {} up{}",
+                match measured.up {
+                    Some(Up::Z) => "Z",
+                    _ => "Y",
+                },
+                match along {
+                    Along {
+                        axis: Y | Z,
+                        downwards: false,
+                    } => "; another axis can be declared",
+                    _ => "",
+                }
+            ));
+        }
         let unit = match unit {
             Unit::Auto => measured.unit.unwrap_or_default(),
             declared => declared,
@@ -202,6 +235,11 @@ impl Conversion {
         (Self { cm, turn }, notices)
     }
 
+    /// Whether there is nothing to do.
+    pub fn is_none(self) -> bool {
+        self.cm == 1.0 && self.turn == Turn::Nothing
+    }
+
     /// Brings a clip to cm and Y up.
     pub fn apply(self, clip: &mut Clip) {
         scale(clip, self.cm);
@@ -213,13 +251,6 @@ impl Conversion {
         self.turn.apply(clip, &TO_Z_UP);
         scale(clip, 1.0 / self.cm);
     }
-}
-
-/// Brings a clip to cm and Y up, see [`Conversion::of`].
-pub fn to_cm_and_y_up(clip: &mut Clip, unit: Unit, up: Up) -> Vec<String> {
-    let (conversion, notices) = Conversion::of(clip, unit, up);
-    conversion.apply(clip);
-    notices
 }
 
 /// A height with two digits, so that many dancers have one notice.
@@ -379,32 +410,155 @@ impl Body {
         (positions[self.head] - feet / self.feet.len() as f64).normalize_or_zero()
     }
 
-    /// Whether it stands along an axis in most of these frames, on the plane through the origin:
-    /// somebody who lies along the axis hardly has the feet there.
-    fn stands_in(&self, skeleton: &Skeleton, sampled: &[&Pose], axis: usize, height: f64) -> bool {
-        let rise = median(sampled.iter().map(|pose| self.rises(skeleton, pose)[axis]));
-        let lower_foot = |pose: &&Pose| {
-            let positions = pose.world_positions(skeleton);
-            let heights = self.feet.iter().map(|&foot| positions[foot][axis]);
-            heights.fold(f64::INFINITY, f64::min)
-        };
-        rise > STANDS && median(sampled.iter().map(lower_foot)).abs() < FLOOR * height
-    }
-
-    /// A rest pose that stands along Y says so, whatever its dancer does (lying is no other axis);
-    /// one that stands along Z, unless the frames stand along Y. One that does not stand (many have
-    /// all bones along X) leaves it to the frames.
-    fn up(&self, skeleton: &Skeleton, rest: &Pose, sampled: &[&Pose], height: f64) -> Option<Up> {
+    /// The upward axis, and the axis along which the body is in most frames where that is another
+    /// one, which may be a dancer who lies.
+    ///
+    /// Who goes about says it at once: the floor is at one height. Else a rest pose that stands
+    /// along Y says so, whatever its dancer does; one that stands along Z, unless the frames stand
+    /// along Y. One that does not stand (many have all bones along X) leaves it to the frames.
+    fn up(
+        &self,
+        skeleton: &Skeleton,
+        rest: &Pose,
+        sampled: &[&Pose],
+        height: f64,
+    ) -> (Option<Up>, Option<Along>) {
         let at_rest = self.rises(skeleton, rest);
-        let stands_in = |axis: usize| self.stands_in(skeleton, sampled, axis, height);
-        if at_rest.y > STANDS || stands_in(1) {
+        let seen = Seen::of(self, skeleton, sampled, height);
+        let goes_on_y = seen.goes_about_on(Y) && (at_rest.z <= STANDS || seen.rises(Y));
+        let goes_on_z = seen.goes_about_on(Z) && (at_rest.y <= STANDS || seen.rises(Z));
+        let stands_on_y = at_rest.y > STANDS
+            || seen.rises(Y) && (at_rest.z <= STANDS || seen.has_feet_at(Y) || !seen.is_low_on(Z));
+        let stands_on_z =
+            at_rest.z > STANDS || seen.rises(Z) && (seen.has_feet_at(Z) || !seen.lies_on(Y));
+        let up = if goes_on_y || !goes_on_z && stands_on_y {
             Some(Up::Y)
-        } else if at_rest.z > STANDS || stands_in(2) {
+        } else if goes_on_z || stands_on_z {
             Some(Up::Z)
         } else {
             None
+        };
+        let (axis, rests) = match up {
+            Some(Up::Z) => (Z, at_rest.z),
+            _ => (Y, at_rest.y),
+        };
+        // Whoever stands at rest lies in the frames, unless with the feet on the other's floor.
+        let lies = |along: &Along| rests <= STANDS || along.axis == Z && seen.has_feet_at(Z);
+        let other = |along: &Along| along.axis != axis || along.downwards;
+        (up, seen.along().filter(other).filter(lies))
+    }
+}
+
+/// An axis and a sense of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Along {
+    axis: usize,
+    downwards: bool,
+}
+
+impl fmt::Display for Along {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.downwards { "-" } else { "" };
+        write!(f, "{sign}{}", ["X", "Y", "Z"][self.axis])
+    }
+}
+
+const Y: usize = 1;
+const Z: usize = 2;
+
+/// How a body is in most frames of a clip, by axis; lengths as shares of its height.
+struct Seen {
+    /// Of the direction from its feet to its head, the median.
+    rise: DVec3,
+    /// How far the lowest joint moves: its deviation.
+    moves: DVec3,
+    /// Medians of the lower foot, the lowest and the highest joint.
+    foot: DVec3,
+    lowest: DVec3,
+    highest: DVec3,
+}
+
+impl Seen {
+    fn of(body: &Body, skeleton: &Skeleton, sampled: &[&Pose], height: f64) -> Self {
+        let world: Vec<Vec<DVec3>> = sampled
+            .iter()
+            .map(|pose| pose.world_positions(skeleton))
+            .collect();
+        let lowest = |frame: &Vec<DVec3>| frame.iter().copied().reduce(DVec3::min);
+        let lowest: Vec<DVec3> = world.iter().filter_map(lowest).collect();
+        let highest = world
+            .iter()
+            .filter_map(|it| it.iter().copied().reduce(DVec3::max));
+        let highest: Vec<DVec3> = highest.collect();
+        let feet = |frame: &Vec<DVec3>| {
+            let feet = body.feet.iter().map(|&foot| frame[foot]);
+            feet.reduce(DVec3::min)
+        };
+        let feet: Vec<DVec3> = world.iter().filter_map(feet).collect();
+        let rises: Vec<DVec3> = sampled
+            .iter()
+            .map(|pose| body.rises(skeleton, pose))
+            .collect();
+        let share = |of: DVec3| of / height.max(f64::MIN_POSITIVE);
+        Self {
+            rise: medians(&rises),
+            moves: share(deviations(&lowest)),
+            foot: share(medians(&feet)),
+            lowest: share(medians(&lowest)),
+            highest: share(medians(&highest)),
         }
     }
+
+    /// Whether the body stands along an axis.
+    fn rises(&self, axis: usize) -> bool {
+        self.rise[axis] > STANDS
+    }
+
+    /// Whether it goes about while its lowest joint stays at one height on one of Y and Z.
+    fn goes_about_on(&self, axis: usize) -> bool {
+        let across = Y + Z - axis;
+        let far = self.moves[across] > FAR && self.moves[axis] < STAYS * self.moves[across];
+        far && !self.rises(across)
+    }
+
+    /// Whether the feet are at the plane through the origin: of somebody who lies along the axis
+    /// they hardly are.
+    fn has_feet_at(&self, axis: usize) -> bool {
+        self.foot[axis].abs() < FLOOR
+    }
+
+    /// Whether it may lie on the plane through the origin, or on a floor near to it.
+    fn is_low_on(&self, axis: usize) -> bool {
+        self.lowest[axis].abs() < LIES
+    }
+
+    /// Whether all of it is low above the plane through the origin.
+    fn lies_on(&self, axis: usize) -> bool {
+        LYING.contains(&self.lowest[axis]) && self.highest[axis] < LIES
+    }
+
+    /// The axis along which the body is.
+    fn along(&self) -> Option<Along> {
+        let axis = (0..3).find(|&axis| self.rise[axis].abs() > STANDS)?;
+        Some(Along {
+            axis,
+            downwards: self.rise[axis] < 0.0,
+        })
+    }
+}
+
+/// By axis.
+fn medians(places: &[DVec3]) -> DVec3 {
+    let of = |axis: usize| median(places.iter().map(|place| place[axis]));
+    DVec3::new(of(0), of(1), of(2))
+}
+
+/// Standard deviations by axis.
+fn deviations(places: &[DVec3]) -> DVec3 {
+    let count = places.len().max(1) as f64;
+    let mean = places.iter().sum::<DVec3>() / count;
+    let squares: DVec3 = places.iter().map(|place| (place - mean).powf(2.0)).sum();
+    (squares / count).powf(0.5)
 }
 
 /// 0 of none.

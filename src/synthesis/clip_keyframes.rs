@@ -8,16 +8,18 @@ use super::completion::CompletionRequest;
 use super::keyframes::{
     FileKeyframe, KeyframeChoice, KeyframeError, TimedKeyframes, kept_channels, lengthened,
 };
-use super::retarget::check_rest;
+use super::retarget::{check_rest, other_rests};
 use crate::data::{DataConfig, FileReading};
 use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
-use crate::motion::{Clip, ContactRule, Feet, Foot, Mapping, Pose};
+use crate::motion::{Clip, ContactRule, Conversion, Feet, Foot, Mapping, Pose};
 
 /// A file that was read.
 pub(super) struct Source {
     pub clip: Clip,
     /// The file's channels, where it was not mapped and every joint turns.
     pub channels: Option<Vec<Vec<Channel>>>,
+    /// How it was brought to cm with Y up, where it was not mapped.
+    conversion: Option<Conversion>,
 }
 
 /// The keyframes of a result with the files that they come from.
@@ -51,6 +53,8 @@ impl ClipKeyframes {
                 sources.insert(file.clone(), source);
             }
         }
+        let clips = timed.keyframes.iter().map(|it| &sources[&it.file].clip);
+        notices.extend(other_rests(clips));
         Ok(Self {
             sources,
             timed,
@@ -130,15 +134,18 @@ impl ClipKeyframes {
     }
 
     /// A result as a file's content: with the channels of the first keyframe's file, or with Z X Y
-    /// rotations where these cannot hold it.
+    /// rotations where these cannot hold it, and in its unit and axis unless it was mapped.
     ///
     /// # Errors
     /// The clip is not one that a file could hold.
     pub fn document(&self, result: &Clip) -> Result<Bvh, BvhError> {
-        let channels = self.sources[&self.timed.keyframes[0].file].channels.clone();
+        let first = &self.sources[&self.timed.keyframes[0].file];
+        let mut result = result.clone();
+        first.conversion.iter().for_each(|it| it.undo(&mut result));
+        let channels = first.channels.clone();
         let channels =
-            channels.unwrap_or_else(|| channel_layout(result, [Axis::Z, Axis::X, Axis::Y]));
-        Bvh::from_clip(result, channels)
+            channels.unwrap_or_else(|| channel_layout(&result, [Axis::Z, Axis::X, Axis::Y]));
+        Bvh::from_clip(&result, channels)
     }
 }
 
@@ -150,14 +157,23 @@ pub(super) fn read(
     let document = bvh::read(path)?;
     let channels = kept_channels(&document).filter(|_| mapping.is_none());
     let read = FileReading::of(document.to_clip(), mapping, data);
-    let FileReading { recording, notices } = read.map_err(|source| KeyframeError::Clip {
+    let FileReading {
+        recording,
+        conversion,
+        notices,
+    } = read.map_err(|source| KeyframeError::Clip {
         file: path.into(),
         source: source.into(),
     })?;
     let clip = recording.clip;
     let named = |notice| format!("{}: {notice}", clip.name);
     let notices = notices.into_iter().map(named).collect();
-    Ok((Source { clip, channels }, notices))
+    let source = Source {
+        clip,
+        channels,
+        conversion: mapping.is_none().then_some(conversion),
+    };
+    Ok((source, notices))
 }
 
 pub(super) fn no_frame(clip: &Clip, frame: usize) -> SynthesisError {

@@ -1,6 +1,7 @@
 //! Which keyframes are asked for: frames of files, and when they are to be met.
 
-use std::path::PathBuf;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Frames of a result at most: an hour at 30 a second.
@@ -71,6 +72,32 @@ impl FromStr for TimedFrame {
             time: time.parse()?,
         })
     }
+}
+
+impl TryFrom<OsString> for TimedFrame {
+    type Error = String;
+
+    /// The same where the file's name is no UTF-8.
+    fn try_from(text: OsString) -> Result<Self, String> {
+        let read: Self = text.to_string_lossy().parse()?;
+        let file = named(&text, &read.file);
+        Ok(Self { file, ..read })
+    }
+}
+
+/// The file's name at the beginning of an argument, whose name as text is `read`.
+#[cfg(unix)]
+fn named(argument: &OsStr, read: &Path) -> PathBuf {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let behind = argument.to_string_lossy().len() - read.as_os_str().len();
+    let name = &argument.as_bytes()[..argument.len() - behind];
+    OsStr::from_bytes(name).into()
+}
+
+#[cfg(not(unix))]
+fn named(_argument: &OsStr, read: &Path) -> PathBuf {
+    read.into()
 }
 
 impl TimedFrame {
@@ -159,5 +186,16 @@ impl FromStr for FileFrom {
             frame: frame.unwrap_or(0),
             said: frame.is_some(),
         })
+    }
+}
+
+impl TryFrom<OsString> for FileFrom {
+    type Error = String;
+
+    /// The same where the file's name is no UTF-8.
+    fn try_from(text: OsString) -> Result<Self, String> {
+        let read: Self = text.to_string_lossy().parse()?;
+        let file = named(&text, &read.file);
+        Ok(Self { file, ..read })
     }
 }

@@ -12,6 +12,7 @@ pub use super::keyframe_choice::{
 };
 use super::own_frames::OnWholeFrames;
 use super::own_rig::OwnRig;
+use super::retarget::other_rests;
 use super::{KeyframeSource, SequenceRequest, SynthesisError};
 use crate::counted::counted;
 use crate::data::{DataConfig, DataError, at_its_rate};
@@ -20,7 +21,7 @@ use crate::motion::bvh::{self, Axis, Bvh, BvhError, Channel, channel_layout};
 use crate::motion::features::VELOCITY_FACTORS;
 use crate::motion::oddities::oddities;
 use crate::motion::rig::{RigKeyframe, nearest_frames, spread};
-use crate::motion::{Clip, Feet, Floor, Mapping, MappingError};
+use crate::motion::{Clip, Conversion, Feet, Floor, Mapping, MappingError};
 
 /// Channels of a joint that has none of its own.
 const ORDER: [Axis; 3] = [Axis::Z, Axis::X, Axis::Y];
@@ -260,6 +261,9 @@ impl Keyframes {
         if !choice.own_frames {
             read.notices.extend(read.counted_otherwise());
         }
+        let clips = read.keyframes.iter();
+        let clips = clips.map(|it| &read.sources[&it.file].clip.clip);
+        read.notices.extend(other_rests(clips));
         Ok(read)
     }
 
@@ -348,9 +352,12 @@ impl Keyframes {
             source_fps: None,
             ..self.data.clone()
         };
-        // Unit and axis of a file whose own frames count are the result's, too.
+        // Unit and axis of the file are the result's, too.
+        let (conversion, _) = Conversion::of(&clip, data.unit, data.up);
         let mapping = match Mapping::onto_dance_skeleton(&clip, self.mapping.as_ref())? {
-            None if self.own_times.is_some() => Some(Cow::Owned(Mapping::recognised(&clip)?)),
+            None if self.own_times.is_some() || !conversion.is_none() => {
+                Some(Cow::Owned(Mapping::recognised(&clip)?))
+            }
             mapping => mapping,
         };
         let channels = kept_channels(document).filter(|_| mapping.is_none());

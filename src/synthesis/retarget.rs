@@ -6,11 +6,13 @@ use super::SynthesisError;
 use crate::models::transition::KeyframePose;
 use crate::motion::features::{ROOT_POSITION, write_positions};
 use crate::motion::fit::fit_rotations;
-use crate::motion::rest_pose::{other_rest_pose, rest_directions};
-use crate::motion::{Pose, Skeleton};
+use crate::motion::rest_pose::{other_rest_pose, rest_directions, rest_poses_apart};
+use crate::motion::{Clip, Pose, Skeleton};
 
 /// Bones that differ by no more than this are the same, cm.
 const SAME: f64 = 1e-6;
+/// Bones that point elsewhere at rest by less than this are not worth a word, rad.
+const ALIKE: f64 = 0.05;
 /// Legs of two dancers are at most so many times as long, whatever their sizes.
 const SIZES: f64 = 3.0;
 /// LeftUpLeg to LeftFoot and RightUpLeg to RightFoot: bones whose lengths say how high a pelvis
@@ -109,6 +111,33 @@ pub(super) fn check_rest(
         }),
         None => Ok(()),
     }
+}
+
+/// Notices of clips whose bones point a little elsewhere at rest than the first one's, a sentence
+/// for each.
+pub(super) fn other_rests<'c>(clips: impl IntoIterator<Item = &'c Clip>) -> Vec<String> {
+    let mut seen: Vec<&Clip> = Vec::new();
+    let mut notices = Vec::new();
+    for clip in clips {
+        if seen.iter().any(|it| it.skeleton == clip.skeleton) {
+            continue;
+        }
+        seen.push(clip);
+        let (first, other) = (&seen[0], &clip.skeleton);
+        let [ours, theirs] = [&first.skeleton, other].map(rest_directions);
+        let apart = rest_poses_apart(other, &ours, &theirs);
+        if let Some((joint, apart)) = apart.filter(|(_, apart)| *apart > ALIKE) {
+            notices.push(format!(
+                "{}: {} points {:.0} degrees elsewhere at rest than in {}; joints keep their \
+                 rotations, so its poses become others by as much",
+                clip.name,
+                other.joints[joint].name,
+                apart.to_degrees(),
+                first.name
+            ));
+        }
+    }
+    notices
 }
 
 fn has_bones(pose: &Pose, skeleton: &Skeleton) -> bool {

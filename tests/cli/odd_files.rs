@@ -211,6 +211,97 @@ fn keyframes_of_another_size_or_rest_pose_are_refused_in_any_unit() {
 }
 
 #[test]
+fn a_result_is_in_the_unit_and_axis_of_its_file_on_the_dance_skeleton_too() {
+    let (folder, paths) = clips(60);
+    let odd = folder.path().join("odd.bvh");
+    let as_written = as_blender_writes(bvh::read(&paths[0]).unwrap().to_clip());
+    write(&odd, &as_written);
+    let out = folder.path().join("out.bvh");
+    let output = keydance()
+        .args(["generate", &interpolation(), "--keyframes", "0,20,50"])
+        .arg("--motion")
+        .arg(&odd)
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let result = bvh::read(&out).unwrap().to_clip();
+    let world = |clip: &Clip, frame: usize| clip.poses[frame].world_positions(&clip.skeleton);
+    for frame in [0, 20, 50] {
+        let pairs = world(&result, frame)
+            .into_iter()
+            .zip(world(&as_written, frame));
+        for (found, expected) in pairs {
+            assert!(found.distance(expected) < 1e-4, "{found} is not {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_mapping_with_a_scale_is_heeded_on_the_dance_skeleton_too() {
+    let (folder, paths) = clips(60);
+    let (small, npy) = (folder.path().join("small.bvh"), folder.path().join("x.npy"));
+    let mut clip = bvh::read(&paths[0]).unwrap().to_clip();
+    let joints = clip.skeleton.joints.iter_mut();
+    joints.for_each(|joint| joint.offset /= 10.0);
+    let poses = clip
+        .poses
+        .iter_mut()
+        .flat_map(|pose| &mut pose.translations);
+    poses.for_each(|place| *place /= 10.0);
+    write(&small, &clip);
+    let mapping = folder.path().join("decimetres.toml");
+    let names = clip.skeleton.joints.iter().map(|joint| &joint.name);
+    let names: String = names.map(|name| format!("{name} = '{name}'\n")).collect();
+    fs::write(&mapping, format!("scale = 10.0\n[joints]\n{names}")).unwrap();
+    let (expected, _) = features(&paths[0], &npy, &[]);
+    let (found, said) = features(&small, &npy, &["--mapping", mapping.to_str().unwrap()]);
+    let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f32::max) < 1e-3, "{said}");
+    assert_eq!(said, "");
+    // One of another rig is not for this clip.
+    let other = fs::read_to_string(&mapping)
+        .unwrap()
+        .replace(" = '", " = 'rig:");
+    fs::write(&mapping, other).unwrap();
+    let (found, _) = features(&paths[0], &npy, &["--mapping", mapping.to_str().unwrap()]);
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn a_keyframe_on_a_slightly_other_rest_pose_is_told_with_its_degrees() {
+    let (folder, paths) = clips(60);
+    let mut other = bvh::read(&paths[0]).unwrap().to_clip();
+    let turn = DQuat::from_rotation_z(0.35);
+    for joint in [16, 17] {
+        let bone = turn * other.skeleton.joints[joint].offset;
+        other.skeleton.joints[joint].offset = bone;
+        other
+            .poses
+            .iter_mut()
+            .for_each(|pose| pose.translations[joint] = bone);
+    }
+    let odd = folder.path().join("odd.bvh");
+    write(&odd, &other);
+    let output = keydance()
+        .args(["generate", &interpolation(), "--keyframe"])
+        .arg(format!("{}:0@0", paths[0].display()))
+        .arg("--keyframe")
+        .arg(format!("{}:40@20", odd.display()))
+        .arg("--out")
+        .arg(folder.path().join("out.bvh"))
+        .output()
+        .unwrap();
+    let said = stderr(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(
+        said.contains("points 20 degrees elsewhere at rest than in"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_recorder_that_rounds_30_frames_a_second_to_0_033_has_all_its_frames() {
     let (folder, paths) = clips(60);
     let (rounded, npy) = (
@@ -249,6 +340,24 @@ fn a_data_folder_may_hold_names_that_are_not_utf_8() {
     )
     .unwrap();
     let output = small.train(&small.path("run"), &["--set", "schedule.fraction=0.05"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let named = |frame: &str| {
+        let mut name = small.path("data").join("").into_os_string();
+        name.push(OsStr::from_bytes(b"caf\xe9.bvh"));
+        name.push(frame);
+        name
+    };
+    let output = keydance()
+        .args(["generate", &interpolation(), "--keyframe"])
+        .arg(named(":0@0"))
+        .arg("--keyframe")
+        .arg(named(":40@1s"))
+        .arg("--velocity-from")
+        .arg(named(":3"))
+        .arg("--out")
+        .arg(small.path("out.bvh"))
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
 }
 

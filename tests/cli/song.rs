@@ -136,6 +136,27 @@ fn one_pose_may_be_held_and_the_dance_may_end_before_the_song() {
 }
 
 #[test]
+fn key_poses_that_a_model_does_not_read_are_said_to_be_left_out() {
+    let folder = TempDir::new().unwrap();
+    for (config, reads) in [("hold", false), ("interpolation", true)] {
+        let mut command = FIXTURE.command("generate");
+        command.arg(format!("experiments/pu2022/{config}.toml"));
+        command.arg("--music").arg(FIXTURE.file(0, "wav"));
+        command.arg("--seed-pose").arg(FIXTURE.key("50"));
+        command.arg("--keyframe").arg(FIXTURE.key("75@4s"));
+        command
+            .arg("--out")
+            .arg(folder.path().join(format!("{config}.bvh")));
+        let says = contains("does not read key poses: left out");
+        let output = command.assert().success();
+        match reads {
+            true => output.stderr(says.not()),
+            false => output.stderr(says),
+        };
+    }
+}
+
+#[test]
 fn what_does_not_fit_the_song_is_said_and_nothing_is_written() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("dance.bvh");

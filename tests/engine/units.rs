@@ -76,7 +76,9 @@ fn config(unit: Unit, up: Up) -> DataConfig {
 }
 
 fn read(clip: Clip, config: &DataConfig) -> (Clip, Vec<String>) {
-    let FileReading { recording, notices } = FileReading::of(clip, None, config).unwrap();
+    let FileReading {
+        recording, notices, ..
+    } = FileReading::of(clip, None, config).unwrap();
     (recording.clip, notices)
 }
 
@@ -177,33 +179,47 @@ fn lying_and_crouching_dancers_are_not_turned() {
     }
 }
 
+/// The same frames with all bones along X at rest, as some recorders write them.
+fn along_x(clip: Clip) -> Clip {
+    let mut other = clip.clone();
+    for (joint, own) in other.skeleton.joints.iter_mut().zip(&clip.skeleton.joints) {
+        if own.parent.is_some() {
+            joint.offset = DVec3::X * own.offset.length();
+        }
+    }
+    for (pose, own) in other.poses.iter_mut().zip(&clip.poses) {
+        let (world, _) = own.world(&clip.skeleton);
+        pose.rotations = vec![DQuat::IDENTITY; 24];
+        for joint in 1..24 {
+            let parent = clip.skeleton.joints[joint].parent.unwrap();
+            pose.translations[joint] = world[joint] - world[parent];
+        }
+    }
+    other
+}
+
+/// Everything elsewhere.
+fn moved(mut clip: Clip, by: DVec3) -> Clip {
+    for pose in &mut clip.poses {
+        pose.translations[0] += by;
+    }
+    clip
+}
+
+/// A dancer who goes this far in a frame.
+fn walking(mut clip: Clip, by: DVec3) -> Clip {
+    for (frame, pose) in clip.poses.iter_mut().enumerate() {
+        pose.translations[0] += frame as f64 * by;
+    }
+    clip
+}
+
+fn up(clip: &Clip) -> Option<Up> {
+    Measured::of(clip).up
+}
+
 #[test]
 fn a_rest_pose_that_does_not_stand_leaves_the_axis_to_the_frames() {
-    // All bones along X at rest, as some recorders write them; the frames are the same.
-    let along_x = |clip: Clip| {
-        let positions: Vec<_> = clip
-            .poses
-            .iter()
-            .map(|pose| pose.world(&clip.skeleton))
-            .collect();
-        let mut other = clip.clone();
-        let bone = |joint: usize| {
-            let length = clip.skeleton.joints[joint].offset.length();
-            DVec3::X * length
-        };
-        for joint in 1..24 {
-            other.skeleton.joints[joint].offset = bone(joint);
-        }
-        for (pose, (world, _)) in other.poses.iter_mut().zip(&positions) {
-            pose.rotations = vec![DQuat::IDENTITY; 24];
-            for joint in 1..24 {
-                let parent = clip.skeleton.joints[joint].parent.unwrap();
-                pose.translations[joint] = world[joint] - world[parent];
-            }
-        }
-        other
-    };
-    let up = |clip: &Clip| Measured::of(clip).up;
     assert_eq!(up(&along_x(dancer())), Some(Up::Y));
     let standing = along_x(z_up(dancer()));
     assert_eq!(up(&standing), Some(Up::Z));
@@ -218,7 +234,87 @@ fn a_rest_pose_that_does_not_stand_leaves_the_axis_to_the_frames() {
         pose.translations[0] = DVec3::new(0.0, 12.0, 0.0);
         pose.rotations[0] = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     }
-    assert_eq!(up(&along_x(lying)), None);
+    assert_eq!(up(&along_x(lying.clone())), None);
+    let (_, notices) = read(along_x(lying), &DataConfig::default());
+    assert!(
+        notices[0].contains("lies along Z in most frames"),
+        "{notices:?}"
+    );
+}
+
+#[test]
+fn the_axis_is_recognised_wherever_the_floor_is() {
+    for height in [-93.0, -40.0, 40.0, 100.0, 500.0] {
+        for aside in [0.0, 60.0, -200.0] {
+            let there = moved(dancer(), DVec3::new(3.0, height, aside));
+            for clip in [there.clone(), along_x(there.clone())] {
+                assert_eq!(up(&clip), Some(Up::Y), "{height} {aside}");
+            }
+            let turned = z_up(there);
+            for clip in [turned.clone(), along_x(turned)] {
+                assert_eq!(up(&clip), Some(Up::Z), "{height} {aside}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_body_that_stands_along_y_is_not_laid_down_by_its_rest_pose() {
+    let quarter = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+    for height in [-93.0, 0.0, 50.0, 100.0] {
+        let clip = moved(dancer(), DVec3::new(0.0, height, 80.0));
+        // The rest pose stands along Z, and the root turns it up.
+        let odd = turned_root(z_up(clip.clone()), quarter);
+        let (found, notices) = read(odd.clone(), &DataConfig::default());
+        assert_eq!((found, notices), (odd, Vec::new()), "{height}");
+    }
+}
+
+#[test]
+fn who_goes_about_says_which_way_is_up_lying_and_by_the_root_alone() {
+    let quarter = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    for height in [-60.0, 0.0, 70.0] {
+        let there = walking(
+            moved(dancer(), DVec3::Y * height),
+            DVec3::new(1.0, 0.0, 4.0),
+        );
+        // Only the root is turned, and the rest pose stands along Y.
+        let by_root = turned_root(there.clone(), quarter);
+        assert_same(&read(by_root, &DataConfig::default()).0, &there);
+        let mut crawling = there;
+        for pose in &mut crawling.poses {
+            pose.rotations[0] *= DQuat::from_rotation_x(0.9);
+        }
+        let crawling = along_x(crawling);
+        assert_eq!(up(&crawling), Some(Up::Y), "{height}");
+        assert_eq!(up(&z_up(crawling)), Some(Up::Z), "{height}");
+    }
+}
+
+#[test]
+fn an_axis_that_cannot_be_up_is_said() {
+    let half = std::f64::consts::FRAC_PI_2;
+    for (turn, says) in [
+        (DQuat::from_rotation_z(-half), "along X in most"),
+        (DQuat::from_rotation_z(half), "along -X in most"),
+        (DQuat::from_rotation_x(2.0 * half), "along -Y in most"),
+        (DQuat::from_rotation_x(-half), "along -Z in most"),
+    ] {
+        let clip = changed(dancer(), |v| turn * v, |q| turn * q * turn.inverse());
+        let (found, notices) = read(clip.clone(), &DataConfig::default());
+        assert_eq!(found, clip);
+        let said = notices.join("\n");
+        assert!(
+            said.contains(says) && said.contains("taken with Y up"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn a_body_without_any_length_is_not_measured() {
+    let flat = scaled(dancer(), 0.0);
+    assert_eq!(Measured::of(&flat), Measured::default());
 }
 
 #[test]
@@ -319,6 +415,18 @@ fn rounded_frame_times_are_taken_for_the_rate_that_they_mean() {
         (0.042, 24.0, 1),
         (0.041, 24.0, 1),
         (0.04171, 24_000.0 / 1001.0, 0),
+        (0.03333, 30.0, 1),
+        (0.033333, 30.0, 0),
+        (0.01111, 90.0, 1),
+        (0.067, 15.0, 1),
+        (0.083, 12.0, 1),
+        (0.021, 48.0, 1),
+        (0.0208, 48.0, 1),
+        (0.0133, 75.0, 1),
+        (0.0069, 144.0, 1),
+        (0.0067, 150.0, 1),
+        (0.0033, 300.0, 1),
+        (0.0028, 360.0, 1),
         (0.0139, 72.0, 1),
         (0.0111, 90.0, 1),
         (0.004, 240.0, 1),
@@ -337,6 +445,11 @@ fn rounded_frame_times_are_taken_for_the_rate_that_they_mean() {
         let (found, frames, said) = frames(frame_time, &at_that_rate);
         assert!((found / fps - 1.0).abs() < 1e-4, "{frame_time}: {found}");
         assert_eq!((frames, said), (20, notices), "{frame_time}");
+    }
+    // No rate that anybody records at: brought to 30 with a word.
+    for odd in [0.03, 0.054, 0.07] {
+        let (_, _, said) = frames(odd, &DataConfig::default());
+        assert_eq!(said, 1, "{odd}");
     }
     let declared = DataConfig {
         source_fps: Some(60.0),
@@ -380,6 +493,33 @@ fn a_jump_out_of_the_first_frames_is_named_and_they_can_be_left_out() {
             ..DataConfig::default()
         };
         assert_eq!(read(clip, &config), (dancer(), Vec::new()));
+    }
+    // A filter smears the jump over some frames, and a T-pose may be held for long.
+    for (held, smeared) in [(1, 3), (40, 0), (40, 3)] {
+        let mut clip = dancer();
+        let dance = clip.poses.clone();
+        for _ in 0..9 {
+            clip.poses.extend(dance.iter().rev().cloned());
+            clip.poses.extend(dance.iter().cloned());
+        }
+        let dance = clip.poses[0].clone();
+        let mut t_pose = dance.clone();
+        t_pose.rotations[1..].fill(DQuat::IDENTITY);
+        t_pose.rotations[0] = DQuat::from_rotation_y(1.5);
+        let between = (1..=smeared).rev().map(|step| {
+            let share = 1.0 - (f64::from(step) / f64::from(smeared + 1)).powi(2);
+            dance.towards(&t_pose, share)
+        });
+        let beginning: Vec<_> = std::iter::repeat_n(t_pose.clone(), held).collect();
+        let between: Vec<_> = between.collect();
+        let first = [beginning, between.into_iter().rev().collect()].concat();
+        clip.poses.splice(0..0, first);
+        let (_, notices) = read(clip, &DataConfig::default());
+        let key = format!("data.skip_frames = {} in a config", held + smeared as usize);
+        assert!(
+            notices.len() == 1 && notices[0].contains(&key),
+            "{key} {notices:?}"
+        );
     }
     let config = DataConfig {
         skip_frames: 20,

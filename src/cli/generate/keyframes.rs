@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::list::within;
+use crate::cli::list::{with_file, within};
 use crate::synthesis::keyframes::{KeyframeChoice, LONGEST, TimedFrame};
 
 #[derive(Debug, Args)]
@@ -20,7 +20,7 @@ pub struct KeyframeArgs {
     keyframes: Vec<usize>,
     /// A frame of any file as a keyframe, and its time in the result, a frame such as
     /// jump.bvh:75@60 or seconds such as jump.bvh:75@12.5s; may be repeated
-    #[arg(long, value_name = "FILE.bvh:FRAME@TIME")]
+    #[arg(long, value_name = "FILE.bvh:FRAME@TIME", value_parser = with_file::<TimedFrame>())]
     keyframe: Vec<TimedFrame>,
     /// Mapping file for clips on a skeleton other than the dance skeleton [default: the run's, or
     /// the joints are recognised]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::cli::list::with_file;
 use crate::report::viewer::Sound;
 use crate::synthesis::keyframes::{FileFrom, Time};
 use crate::synthesis::song::{Seed, SongRequest};
@@ -15,12 +16,13 @@ pub struct SongArgs {
     #[arg(long, value_name = "SONG")]
     music: Option<PathBuf>,
     /// BVH file whose motion the dance goes on from: its last frames, or those from FRAME on
-    #[arg(long, value_name = "FILE.bvh[:FRAME]", requires = "music")]
+    #[arg(long, value_name = "FILE.bvh[:FRAME]", requires = "music", value_parser = with_file::<FileFrom>())]
     seed_motion: Option<FileFrom>,
     /// A pose that is held before the dance goes on from it
     #[arg(
         long,
         value_name = "FILE.bvh[:FRAME]",
+        value_parser = with_file::<FileFrom>(),
         requires = "music",
         conflicts_with = "seed_motion"
     )]

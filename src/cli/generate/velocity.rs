@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::list::with_file;
 use crate::synthesis::controls::{Gains, VelocityControls};
 use crate::synthesis::keyframes::FileFrom;
 
@@ -15,7 +16,7 @@ pub struct VelocityArgs {
     velocity: Option<Gains>,
     /// Velocity factors of another clip, from its frame FRAME (0 where left out) on [default:
     /// --motion's, else evenly from keyframe to keyframe]
-    #[arg(long, value_name = "FILE.bvh[:FRAME]")]
+    #[arg(long, value_name = "FILE.bvh[:FRAME]", value_parser = with_file::<FileFrom>())]
     velocity_from: Option<FileFrom>,
     /// Velocity factors from a CSV file with the columns
     /// frame,trunk,left_leg,right_leg,right_arm,left_arm (cm/frame), a row for every frame of the

@@ -7,7 +7,7 @@ use toml::Table;
 
 use crate::data::DataConfig;
 use crate::evaluation::music_dance::PU2022;
-use crate::models::generator::{Motion, NeededPoses, Needs, Request};
+use crate::models::generator::{Condition, Motion, NeededPoses, Needs, Request};
 use crate::models::li2023;
 use crate::models::settings::{ModelKind, ModelSettings, Paper};
 use crate::models::{Generator, ModelError};
@@ -136,7 +136,10 @@ impl Generator for RotationBaseline {
                 Self::KeyPoseInterpolation | Self::HeldSeed => NeededPoses::Seed(1),
             },
             conditions: &[],
-            heeds: &[],
+            heeds: match self {
+                Self::KeyPoseInterpolation => &[Condition::KeyPoses],
+                Self::Slerp | Self::HeldPose | Self::HeldSeed => &[],
+            },
         }
     }
 

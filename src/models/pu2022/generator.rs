@@ -293,7 +293,7 @@ impl Generator for TrainedPu2022 {
                 true => &[Condition::Music],
                 false => &[],
             },
-            heeds: &[],
+            heeds: &[Condition::KeyPoses],
         }
     }
 

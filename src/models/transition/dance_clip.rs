@@ -43,7 +43,10 @@ impl DanceClip {
         mapping: Option<&Mapping>,
         config: &DataConfig,
     ) -> Result<(Self, Vec<String>), DataError> {
-        let FileReading { recording, notices } = FileReading::of(clip, mapping, config)?;
+        let reading = FileReading::of(clip, mapping, config)?;
+        let FileReading {
+            recording, notices, ..
+        } = reading;
         let measured = Self::measure(recording.clip, &config.features())?;
         let named = |notice| format!("{}: {notice}", measured.name);
         let notices = notices.into_iter().map(named).collect();

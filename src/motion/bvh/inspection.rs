@@ -30,13 +30,17 @@ impl Inspection<'_> {
         }
     }
 
-    fn axis(&self, measured: &Measured) -> (Axis, &'static str) {
+    fn axis(&self, measured: &Measured) -> (Axis, String) {
+        let as_it_is = match measured.along {
+            Some(along) => format!("though the body is along {along} in most frames"),
+            None => "as the body stands".into(),
+        };
         match (self.up, measured.up) {
-            (Up::Z, _) => (Axis::Z, "Z, as declared"),
-            (Up::Y, _) => (Axis::Y, "Y, as declared"),
-            (Up::Auto, Some(Up::Z)) => (Axis::Z, "Z, as the body stands"),
-            (Up::Auto, Some(_)) => (Axis::Y, "Y, as the body stands"),
-            (Up::Auto, None) => (Axis::Y, "not recognised, taken as Y"),
+            (Up::Z, _) => (Axis::Z, "Z, as declared".into()),
+            (Up::Y, _) => (Axis::Y, "Y, as declared".into()),
+            (Up::Auto, Some(Up::Z)) => (Axis::Z, format!("Z, {as_it_is}")),
+            (Up::Auto, Some(_)) => (Axis::Y, format!("Y, {as_it_is}")),
+            (Up::Auto, None) => (Axis::Y, "not recognised, taken as Y".into()),
         }
     }
 }

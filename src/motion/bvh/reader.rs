@@ -71,6 +71,9 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<Bvh, BvhError> {
 /// Refuses what begins as no text does: other programs' binary files, prepared sets.
 fn check_text(bytes: &[u8], name: &str) -> Result<(), BvhError> {
     let head = &bytes[..bytes.len().min(HEAD as usize)];
+    // A short file may be filled up with zeros.
+    let end = head.iter().rposition(|&byte| byte != 0);
+    let head = &head[..end.map_or(0, |last| last + 1)];
     if !head.iter().any(|byte| *byte < b'\t') {
         return Ok(());
     }

@@ -44,7 +44,9 @@ pub fn clips_page(
     let mut shown: Vec<Clip> = Vec::new();
     for (number, clip) in clips.into_iter().enumerate() {
         let mapping = mappings.as_ref().and_then(|all| all[number].as_ref());
-        let FileReading { recording, notices } = FileReading::of(clip, mapping, &at_rate)?;
+        let FileReading {
+            recording, notices, ..
+        } = FileReading::of(clip, mapping, &at_rate)?;
         note(&recording.clip, notices);
         shown.push(recording.clip);
     }

@@ -5,7 +5,9 @@ const page = document.documentElement.outerHTML;
 
 /** Joints (name, parent, offset, channels), seconds a frame and rows of numbers of a BVH file. */
 function parseBvh(text) {
-  const words = text.replace(/(frames|time):/gi, "$1: ").split(/\s+/).filter(Boolean);
+  // Behind an end-of-file mark, or where a file is filled up with zeros, is nothing.
+  const whole = text.split(/[\x1a\0]/)[0];
+  const words = whole.replace(/(frames|time)\s*:/gi, "$1: ").split(/\s+/).filter(Boolean);
   const joints = [];
   const open = [];
   let at = 0;
@@ -46,7 +48,7 @@ function parseBvh(text) {
   if (!(frameTime > 0)) throw new Error("its frame time is not above 0");
   const channels = joints.reduce((sum, joint) => sum + joint.channels.length, 0);
   const rows = Array.from({ length: frames }, () => Array.from({ length: channels }, number));
-  if (at < words.length && words[at] !== "\x1a") throw new Error(`it has more numbers than its ${frames} frames`);
+  if (at < words.length) throw new Error(`it has more numbers than its ${frames} frames`);
   return { joints, frameTime, rows };
 }
 

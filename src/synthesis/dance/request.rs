@@ -40,7 +40,14 @@ impl DanceRequest {
     /// What is asked for beside poses that a model with these needs does not read.
     pub(super) fn unread(&self, needs: &Needs) -> Vec<Condition> {
         let contacts = self.contacts.as_ref().map(|_| Condition::Contacts);
-        let asked = [self.trajectory.asked(), self.velocity.asked(), contacts];
+        let behind_seed = self.song.is_some() && !self.keyframes.further.is_empty();
+        let key_poses = behind_seed.then_some(Condition::KeyPoses);
+        let asked = [
+            self.trajectory.asked(),
+            self.velocity.asked(),
+            contacts,
+            key_poses,
+        ];
         let asked = asked.into_iter().flatten();
         asked.filter(|&it| !needs.reads(it)).collect()
     }

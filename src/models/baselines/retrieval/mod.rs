@@ -14,7 +14,7 @@ use toml::Table;
 
 use crate::data::{DataConfig, Recording};
 use crate::evaluation::music_dance::PU2022;
-use crate::models::generator::{Motion, NeededPoses, Needs, Request};
+use crate::models::generator::{Condition, Motion, NeededPoses, Needs, Request};
 use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
 use crate::models::{Generator, ModelError};
 use crate::motion::Pose;
@@ -184,7 +184,7 @@ impl Generator for KeyPoseRetrieval {
         Needs {
             poses: NeededPoses::Seed(1),
             conditions: &[],
-            heeds: &[],
+            heeds: &[Condition::KeyPoses],
         }
     }
 
