@@ -75,9 +75,11 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
     check_outputs_beside(args.out.as_deref(), &args.json, inputs, args.force)?;
     let dataset = Dataset::load(&args.data, &subject.config.data)?;
     warn(&dataset.warnings);
-    if !args.other_data {
-        subject.check_data(&dataset, &args.data)?;
-    }
+    let own_data = subject.check_data(&dataset, &args.data);
+    let own_data = match args.other_data {
+        true => own_data.is_ok(),
+        false => own_data.map(|()| true)?,
+    };
     subject.model.look_up_in(&dataset.train)?;
     let lengths = BTreeSet::from_iter(args.lengths.into_iter().map(usize::from));
     let choice = ScoringChoice {
@@ -88,6 +90,7 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
         },
         protocols: args.protocol,
         out: args.out,
+        own_data,
         force: args.force,
     };
     let scoring = Scoring::new(&subject, &dataset, &choice)?;

@@ -24,8 +24,8 @@ pub struct GradcheckArgs {
     #[arg(long, value_name = "B", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1000))]
     windows: u16,
     /// Most numbers of each parameter that are compared
-    #[arg(long, value_name = "K", default_value_t = 5)]
-    per_parameter: usize,
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    per_parameter: u32,
     /// Seed of motion and weights
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -46,7 +46,7 @@ pub fn run(args: GradcheckArgs) -> anyhow::Result<()> {
         frames: args.frames.map(usize::from),
         full_size: args.full_size,
         windows: args.windows.into(),
-        per_parameter: args.per_parameter,
+        per_parameter: args.per_parameter as usize,
         seed: args.seed,
     };
     let report = GradientReport::of(&*experiment.model, &options)?;

@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::notice::{out, warn};
 use super::progress::Meter;
-use super::stop::{Stop, interrupted};
+use super::stop::{Stop, command, interrupted};
 use crate::counted::counted;
 use crate::data::{is_prepared, prepare};
 use crate::experiment::ExperimentConfig;
@@ -72,7 +72,10 @@ pub fn run(args: PrepareArgs) -> anyhow::Result<ExitCode> {
     });
     meter.iter_mut().for_each(Meter::clear);
     let Some(prepared) = prepared? else {
-        return Ok(interrupted("stopped; nothing is written"));
+        return Ok(interrupted(format_args!(
+            "stopped, nothing is written; begin again with\n  {}",
+            command()
+        )));
     };
     warn(&prepared.warnings);
     writeln!(

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,8 @@ use crate::ranks;
 const INTERRUPTED: u8 = 130;
 /// How long an evaluation may take to end by itself.
 const LATE: Duration = Duration::from_secs(1);
+/// Time between two looks at whether a stop was asked for.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Whether the user asked to stop.
 pub struct Stop {
@@ -22,6 +25,15 @@ pub struct Stop {
     trainings: Arc<()>,
     /// What is said at the end.
     pub farewell: String,
+}
+
+/// While it lives, nothing is lost by an end at once; see [`Stop::at_once`].
+pub struct AtOnce(Arc<AtomicBool>);
+
+impl Drop for AtOnce {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Stop {
@@ -49,6 +61,22 @@ impl Stop {
 
     pub fn is_asked(&self) -> bool {
         self.asked.get().is_some()
+    }
+
+    /// Ends the process with this farewell where it is asked to stop before the result is dropped.
+    pub fn at_once(&self, farewell: String) -> AtOnce {
+        let ended = Arc::new(AtomicBool::new(false));
+        let (asked, over) = (Arc::clone(&self.asked), Arc::clone(&ended));
+        std::thread::spawn(move || {
+            while !over.load(Ordering::Relaxed) {
+                if asked.get().is_some() {
+                    notice(&farewell);
+                    std::process::exit(INTERRUPTED.into());
+                }
+                std::thread::sleep(LOOK_EVERY);
+            }
+        });
+        AtOnce(ended)
     }
 
     /// Says that a training goes on while the result lives.

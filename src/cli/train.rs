@@ -93,6 +93,12 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
     let (config, dataset) = (loaded.config, &loaded.dataset);
     let trainer = Trainer::from_weights(config.clone(), dataset, threads, loaded.start.as_ref());
     let mut trainer = together.agree(trainer)?;
+    let resume = if args.resume { "" } else { " --resume" };
+    let stop = Stop::on_signal(String::new())?;
+    let mut before_the_first_step = Some(stop.at_once(format!(
+        "stopped before a step was done; go on with\n  {}{resume}",
+        command()
+    )));
     let taken = together
         .is_first()
         .then(|| take_up(&args, loaded.given.as_deref(), &mut trainer));
@@ -112,8 +118,8 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         None => {}
     }
     let mut progress = Progress::new(String::new(), trainer.task(), trainer.frame_steps_done());
-    let stop = Stop::on_signal(String::new())?;
     let outcome = trainer.run(run.as_ref(), &mut |report| {
+        before_the_first_step = None;
         progress.step(report);
         match stop.is_asked() {
             true => ControlFlow::Break(()),
@@ -132,7 +138,6 @@ pub fn run(args: TrainArgs) -> anyhow::Result<ExitCode> {
         _ if finished => Ok(ExitCode::SUCCESS),
         _ => {
             let (done, all) = (trainer.steps_done(), trainer.task().steps());
-            let resume = if args.resume { "" } else { " --resume" };
             Ok(interrupted(format_args!(
                 "stopped and saved after step {done} of {all}; go on with\n  {}{resume}",
                 command()

@@ -11,7 +11,7 @@ use super::ProtocolScores;
 use crate::counted::counted;
 use crate::data::{DataPart, Dataset, EmptyPart, Recording};
 use crate::report::thousands;
-use crate::run::{FileError, write_json};
+use crate::run::{FileError, RunFolder, write_json};
 
 /// Why a folder's scores cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -39,15 +39,25 @@ pub struct EvaluatedData {
     pub most_windows: Option<usize>,
     /// Digest of the whole data set, see [`Dataset::digest`].
     pub data_digest: String,
+    /// SHA-256 of the file of the weights that were scored; none without one, or where the
+    /// version that evaluated did not keep it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
     /// Version of keydance that evaluated, and its commit where it was built in a git checkout.
     pub version: String,
     pub commit: Option<String>,
 }
 
 impl EvaluatedData {
+    /// Of a model with the weights of the file with this digest.
+    ///
     /// # Errors
     /// The data set has no such clips.
-    pub fn of(dataset: &Dataset, part: DataPart) -> Result<Self, EmptyPart> {
+    pub fn of(
+        dataset: &Dataset,
+        part: DataPart,
+        weights: Option<String>,
+    ) -> Result<Self, EmptyPart> {
         let clips = part.of(dataset)?;
         Ok(Self {
             part,
@@ -55,6 +65,7 @@ impl EvaluatedData {
             frames: clips.iter().map(Recording::frames).sum(),
             most_windows: None,
             data_digest: dataset.digest.clone(),
+            weights,
             version: env!("CARGO_PKG_VERSION").into(),
             commit: option_env!("KEYDANCE_COMMIT").map(Into::into),
         })
@@ -74,7 +85,7 @@ impl EvaluatedData {
     /// "at most 200 windows of each length of ", where not all were scored.
     pub fn windows(&self) -> String {
         match self.most_windows {
-            Some(most) => format!("at most {most} windows of each length of "),
+            Some(most) => format!("at most {} of each length of ", counted(most, "window")),
             None => String::new(),
         }
     }
@@ -147,7 +158,8 @@ impl EvaluationRecord {
     /// Reads what [`EvaluationRecord::write`] wrote of the test clips.
     ///
     /// # Errors
-    /// The folder has no such scores (the error says how to get them), or a file is damaged.
+    /// The folder has no such scores (the error says how to get them), or a file is damaged; they
+    /// are scores of other weights than the run's in the folder ended with.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let [scores, data] = Self::files(DataPart::Test);
         let record = Self {
@@ -162,7 +174,17 @@ impl EvaluationRecord {
                 remedy(folder)
             )));
         }
-        Ok(record)
+        let manifest = RunFolder::open(folder).manifest().ok().flatten();
+        let ended = manifest.and_then(|it| it.weights_file_digest);
+        match record.data.weights.as_ref().zip(ended) {
+            Some((scored, ended)) if *scored != ended => Err(RecordError::Refused(format!(
+                "{} are scores of other weights than the training ended with, such as of a \
+                 checkpoint; to get those, {}",
+                folder.join(scores).display(),
+                remedy(folder)
+            ))),
+            _ => Ok(record),
+        }
     }
 }
 

@@ -117,7 +117,9 @@ impl EvaluatedRun {
         let shared = scores.filter(|(protocol, _)| other.record.scores.by(protocol).is_some());
         let windows = shared.map(|(protocol, scores)| {
             let by_length: BTreeMap<_, _> = scores.windows().iter().cloned().collect();
-            format!("{by_length:?} by {protocol}")
+            let by_length = by_length.iter();
+            let by_length = by_length.map(|(length, windows)| format!("{length}: {windows}"));
+            format!("{} by {protocol}", by_length.collect::<Vec<_>>().join(", "))
         });
         let windows = windows.collect::<Vec<_>>().join(", ");
         format!(

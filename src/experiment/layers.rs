@@ -25,6 +25,8 @@ const DEEPEST_KEY: usize = 16;
 const WHOLE: [&str; 3] = ["data.split", "data.mapping", "model.mapping"];
 /// Tables that may name a mapping file by their key `mapping`.
 const WITH_MAPPING: [&str; 2] = ["data", "model"];
+/// Keys that every config may have and the defaults have not.
+const OPTIONAL: [&str; 3] = ["paper", "start", "validation"];
 /// The table of a budget with what is over single rows: `[rows.NAME]`.
 const ROWS: &str = "rows";
 
@@ -63,6 +65,9 @@ impl Layer {
             let path = folder.join(path);
             let mapping = Mapping::read(&path).map_err(|error| {
                 let what_to_do = match &error {
+                    MappingError::Read { .. } if folder == Path::new("") => {
+                        "; the path counts from the current folder"
+                    }
                     MappingError::Read { .. } => {
                         "; the path counts from the config's folder, in the run of an earlier \
                          version, too: put the mapping file that it was made with there"
@@ -123,6 +128,29 @@ impl ExperimentConfig {
             layers.push(set_layer(set)?);
         }
         resolve(&layers)
+    }
+
+    /// The experiments that a budget has tables `[rows.NAME]` for.
+    ///
+    /// # Errors
+    /// It cannot be read, or `rows` is none of tables.
+    pub fn rows_of_budget(budget: &Path) -> Result<Vec<String>, ConfigError> {
+        let mut layers = Vec::new();
+        read_layers(budget, &mut Vec::new(), &mut layers)?;
+        let mut names = Vec::new();
+        for Layer { origin, table, .. } in layers {
+            let Some(rows) = table.get(ROWS) else {
+                continue;
+            };
+            let rows = rows
+                .as_table()
+                .filter(|rows| rows.values().all(Value::is_table));
+            let rows = rows.ok_or_else(|| {
+                ConfigError::Refused(format!("{origin}: {ROWS}: expected tables [{ROWS}.NAME]"))
+            })?;
+            names.extend(rows.keys().cloned());
+        }
+        Ok(names)
     }
 
     /// The defaults under `sets`.
@@ -405,6 +433,17 @@ fn parse_layer(
     let keys = table.clone().into_iter();
     let (given, mut shared): (Table, Table) = keys.partition(|(key, _)| own.contains_key(key));
     shared.entry("name").or_insert(kind.default_name().into());
+    let known = Table::try_from(Shared::default())?;
+    let other = |key: &&String| !known.contains_key(*key) && !OPTIONAL.contains(&key.as_str());
+    if let Some(key) = shared.keys().find(other) {
+        let mut expected: Vec<&str> = known.keys().chain(own.keys()).map(String::as_str).collect();
+        expected.extend(OPTIONAL);
+        expected.sort_unstable();
+        return Err(ConfigError::Refused(format!(
+            "{origin}: unknown key {key}: expected one of {}",
+            expected.join(", ")
+        )));
+    }
     let shared: Shared = shared.try_into().map_err(unread)?;
     let config = ExperimentConfig {
         name: shared.name,

@@ -78,10 +78,7 @@ impl Reproduction<'_> {
         let is_own = |folder: &str| self.rows.iter().any(|row| row.folder == folder);
         let Ok(text) = std::fs::read_to_string(self.out.join(MANIFEST)) else {
             // Stopped before its first tables, or not begun.
-            let begun = |row: &Row| {
-                let folders = [self.out.join(&row.folder), self.runs.join(&row.folder)];
-                folders.iter().any(|folder| folder.exists())
-            };
+            let begun = |row: &Row| self.out.join(&row.folder).exists();
             return match self.rows.iter().any(begun) {
                 true => Ok(()),
                 false => Ok(check_output_folder(self.out, false)?),

@@ -85,7 +85,9 @@ impl RowResults {
                 Curves::of(&row.folder, &row.config, log).write(path, &Curves::OF_ROW)?;
             }
         }
-        let data = EvaluatedData::of(dataset, DataPart::Test)?;
+        let manifest = run.map(RunFolder::manifest).transpose()?.flatten();
+        let weights = manifest.and_then(|it| it.weights_file_digest);
+        let data = EvaluatedData::of(dataset, DataPart::Test, weights)?;
         Ok(EvaluationRecord { scores, data }.write(path)?)
     }
 

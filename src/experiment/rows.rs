@@ -97,6 +97,13 @@ pub fn read(
         let name = config.name.clone();
         (place(&name).unwrap_or(usize::MAX), name)
     });
+    if let Some(budget) = budget {
+        let budgeted = ExperimentConfig::rows_of_budget(budget);
+        let flag = format!("--budget {}: rows", budget.display());
+        for name in budgeted? {
+            known(&configs, &name, &flag, folder)?;
+        }
+    }
     for (index, Seeds { name, .. }) in seeds.iter().enumerate() {
         known(&configs, name, "--seeds", folder)?;
         if seeds[..index].iter().any(|other| other.name == *name) {

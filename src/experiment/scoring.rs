@@ -21,6 +21,8 @@ pub struct ScoringChoice {
     pub protocols: Vec<String>,
     /// For a config: a folder for its scores.
     pub out: Option<PathBuf>,
+    /// Whether the data is the run's.
+    pub own_data: bool,
     /// Replace scores on other clips.
     pub force: bool,
 }
@@ -52,14 +54,16 @@ impl<'s> Scoring<'s> {
             options,
             protocols: names,
             out,
+            own_data,
             force,
         } = choice;
-        let data = EvaluatedData::of(dataset, *part)?;
+        let data = EvaluatedData::of(dataset, *part, subject.weights.clone())?;
         let mut protocols = subject.config.protocols_with(options);
         if !names.is_empty() {
             protocols.extend(subject.config.protocols_by_name(options));
         }
         let folder = subject.scores_folder(out.as_deref(), &data, *force)?;
+        let folder = folder.filter(|_| subject.run.is_none() || *own_data || *force);
         let whole = *options == EvaluationOptions::default() && names.is_empty();
         let is_kept = match &subject.run {
             Some(run) => whole && *run.config()?.model == *subject.config.model,
@@ -90,7 +94,9 @@ impl<'s> Scoring<'s> {
     /// That a run's folder keeps the scores that it has.
     pub fn warning(&self) -> Option<&'static str> {
         let keeps = self.subject.run.is_some() && self.folder.is_none();
-        keeps.then_some("the run keeps its scores on other clips; --force replaces them")
+        keeps.then_some(
+            "the run keeps its scores, and none on other data than its own; --force replaces them",
+        )
     }
 
     /// The scores that `evaluate` gives by each protocol.
@@ -130,7 +136,8 @@ impl<'s> Scoring<'s> {
         let mut text = Tables { protocols, printed }.terminal(&[row]);
         if let Some(most) = self.most_windows {
             text += &format!(
-                "\nat most {most} windows of each length: not comparable with scores on all\n"
+                "\nat most {} of each length: not comparable with scores on all\n",
+                counted(most, "window")
             );
         }
         Ok(text)

@@ -17,7 +17,7 @@ use thiserror::Error;
 
 use super::Statistics;
 use crate::autograd::Parameters;
-use crate::data::hexadecimal;
+use crate::data::{file_digest, hexadecimal};
 use crate::nn::MOST_WEIGHTS;
 use crate::run::FileError;
 
@@ -61,6 +61,8 @@ pub struct SavedWeights {
     pub config: String,
     /// Version of keydance that wrote the file.
     pub version: String,
+    /// SHA-256 of the file, hexadecimal.
+    pub digest: String,
     arrays: BTreeMap<String, ArrayD<f32>>,
 }
 
@@ -164,6 +166,7 @@ impl SavedWeights {
             path: path.into(),
             config,
             version,
+            digest: file_digest(content),
             arrays: arrays.collect::<Result<_, WeightsError>>()?,
         })
     }

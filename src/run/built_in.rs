@@ -44,6 +44,7 @@ impl Subject {
             model,
             run: None,
             manifest: Some(manifest),
+            weights: Some(weights.digest),
         })
     }
 }

@@ -95,7 +95,12 @@ pub(crate) fn write(
     let whole = folder.join(format!("{PREFIX}{step:08}"));
     let partial = folder.join(format!("{}{PARTIAL}", name(&whole)));
     durable::remove_folder(&partial)?;
-    fs::create_dir_all(&partial).map_err(FileError::at(&partial, "created"))?;
+    // The run's own folder is not made again where it was moved away meanwhile.
+    for made in [folder, &partial] {
+        if !made.is_dir() {
+            fs::create_dir(made).map_err(FileError::at(made, "created"))?;
+        }
+    }
     durable::write_synced(&partial.join(WEIGHTS_FILE), weights)?;
     durable::write_synced(&partial.join(STATE_FILE), state)?;
     durable::sync_folder(&partial)?;

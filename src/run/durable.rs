@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
 use thiserror::Error;
@@ -49,8 +50,10 @@ pub(crate) fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), File
             .and_then(|mut file| file.write_all(content.as_ref()))
             .map_err(FileError::at(path, "written"));
     }
-    let name = real.file_name().unwrap_or_default().to_string_lossy();
-    let partial = real.with_file_name(format!(".{name}.partial"));
+    // A name of its own, as another thread or process may write to the same place.
+    static WRITTEN: AtomicU64 = AtomicU64::new(0);
+    let (process, number) = (std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
+    let partial = real.with_file_name(format!(".keydance.{process}.{number}.partial"));
     let written = write_synced(&partial, content.as_ref()).and_then(|()| rename(&partial, &real));
     written.map_err(|error| {
         // What is left of it takes room on a full disk.

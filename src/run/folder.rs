@@ -42,13 +42,15 @@ impl RunFolder {
     /// A folder for a new run; made where there is none.
     ///
     /// # Errors
-    /// The folder holds a run already, another training writes to it, or it cannot be written.
+    /// The folder holds a run already or other files, another training writes to it, or it cannot
+    /// be written.
     pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         // What no training has locked before stays without a lock.
         if !path.join(LOCK).exists() {
-            Self::open(path).check_new()?;
+            Self::open(path).check_empty()?;
         }
         let run = Self::locked(path)?;
+        run.check_empty()?;
         run.begin(config)?;
         Ok(run)
     }
@@ -60,7 +62,14 @@ impl RunFolder {
     /// written.
     pub fn replace(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
         let run = Self::locked(path)?;
-        if run.config_path().exists() && run.config()?.name == config.name {
+        if run.config_path().exists() {
+            let name = run.config()?.name;
+            if name != config.name {
+                return Err(RunError::Refused(format!(
+                    "{} holds the run {name}; give another --out",
+                    path.display()
+                )));
+            }
             durable::remove_folder(&run.checkpoints())?;
             run.remove_best()?;
             for name in [MANIFEST, LOG, WEIGHTS_FILE, START_FILE, Self::CONFIG] {
@@ -77,8 +86,20 @@ impl RunFolder {
     /// The run there has another config, another training writes to it, or it cannot be read or
     /// written.
     pub fn resume(path: &Path, config: &ExperimentConfig) -> Result<Self, RunError> {
+        let there = Self::open(path);
+        let is_new = !there.config_path().exists();
+        if is_new {
+            if let Some(part) = there.part_of_a_run() {
+                return Err(RunError::Refused(format!(
+                    "{} holds {part} of a run without its {}; put that back, or give another --out",
+                    path.display(),
+                    Self::CONFIG
+                )));
+            }
+            there.check_empty()?;
+        }
         let run = Self::locked(path)?;
-        if !run.config_path().exists() {
+        if is_new {
             run.begin(config)?;
             return Ok(run);
         }
@@ -146,14 +167,34 @@ impl RunFolder {
 
     /// Refuses a folder that holds what a run would write.
     fn check_new(&self) -> Result<(), RunError> {
-        let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE];
-        if own.iter().any(|name| self.path.join(name).exists()) {
+        if self.part_of_a_run().is_some() {
             return Err(RunError::Refused(format!(
                 "{} holds a run already; go on with --resume, or give another --out",
                 self.path.display()
             )));
         }
         Ok(())
+    }
+
+    /// A file or folder of a run that is there.
+    fn part_of_a_run(&self) -> Option<&'static str> {
+        let own = [Self::CONFIG, MANIFEST, LOG, CHECKPOINTS, WEIGHTS_FILE];
+        own.into_iter().find(|name| self.path.join(name).exists())
+    }
+
+    /// Refuses a folder that holds other files: a run would write among them.
+    fn check_empty(&self) -> Result<(), RunError> {
+        self.check_new()?;
+        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let mut names = entries.map(|entry| entry.file_name());
+        match names.find(|name| name != LOCK) {
+            None => Ok(()),
+            Some(name) => Err(RunError::Refused(format!(
+                "{} holds other files, such as {}; give another --out",
+                self.path.display(),
+                name.to_string_lossy()
+            ))),
+        }
     }
 
     /// Refuses a config that differs from the run's in these keys.
@@ -203,7 +244,6 @@ impl RunFolder {
         self.path.join(WEIGHTS_FILE)
     }
 
-    /// The file of the resolved config.
     /// Refuses to go on writing to a folder that is no longer there as it was begun.
     ///
     /// # Errors
@@ -220,6 +260,7 @@ impl RunFolder {
         }
     }
 
+    /// The file of the resolved config.
     pub fn config_path(&self) -> PathBuf {
         self.path.join(Self::CONFIG)
     }

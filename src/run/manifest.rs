@@ -92,6 +92,9 @@ pub struct Manifest {
     pub parameters: usize,
     /// SHA-256 of the weights (see [`crate::models::weights::digest`]), once finished.
     pub weights_digest: Option<String>,
+    /// SHA-256 of the file of these weights; none where the run's version did not keep it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights_file_digest: Option<String>,
     /// The step of the best validation score, where the weights at the end are its.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub best_step: Option<u64>,
@@ -165,6 +168,7 @@ impl Manifest {
             data_digest: dataset.digest.clone(),
             parameters,
             weights_digest: None,
+            weights_file_digest: None,
             best_step: None,
             facts: task.facts(),
         }

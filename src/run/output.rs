@@ -8,6 +8,7 @@ use same_file::Handle;
 
 use super::error::RunError;
 use super::folder::RunFolder;
+use crate::counted::counted;
 use crate::data::{clip_files, is_clip};
 
 /// Refuses files that a command must not write, before it writes any. `inputs` are the files that
@@ -129,9 +130,9 @@ pub fn beside_clips(file: &Path, inputs: &[&PathBuf]) -> Option<String> {
     let beside_input = inputs.iter().any(|input| input.parent() == Some(folder));
     (others > 0 && beside_input).then(|| {
         format!(
-            "{} lies beside {others} other clips: where their folder is given as --data, it is one \
-             of them",
-            file.display()
+            "{} lies beside {}: where their folder is given as --data, it is one of them",
+            file.display(),
+            counted(others, "other clip")
         )
     })
 }

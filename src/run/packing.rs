@@ -5,7 +5,9 @@ use std::path::Path;
 use super::durable::{FileError, replace as replace_file};
 use super::error::RunError;
 use super::folder::RunFolder;
+use super::manifest::Manifest;
 use super::output::check_output_folder;
+use crate::data::file_digest;
 
 impl RunFolder {
     /// Writes config, manifest and the newest weights into a folder, which is a run's folder then:
@@ -28,10 +30,12 @@ impl RunFolder {
         std::fs::create_dir_all(folder).map_err(FileError::at(folder, "created"))?;
         let packed = RunFolder::open(folder);
         packed.write_config(&config)?;
-        if self.manifest_path().exists() {
-            let path = self.manifest_path();
-            let manifest = std::fs::read(&path).map_err(FileError::at(&path, "read"))?;
-            replace_file(&packed.manifest_path(), manifest)?;
+        if let Some(manifest) = self.manifest()? {
+            let digest = manifest.weights_file_digest.is_some();
+            packed.write_manifest(&Manifest {
+                weights_file_digest: digest.then(|| file_digest(&weights)),
+                ..manifest
+            })?;
         }
         Ok(replace_file(&packed.weights(), weights)?)
     }

@@ -22,6 +22,8 @@ pub struct Subject {
     pub run: Option<RunFolder>,
     /// What is known of its training; none for a config.
     pub manifest: Option<Manifest>,
+    /// SHA-256 of the file of its weights; none without one.
+    pub weights: Option<String>,
 }
 
 /// Refuses a config that differs from the run's in what the run's model was trained with.
@@ -69,14 +71,14 @@ impl Subject {
         if let Some(run) = run.as_ref().filter(|_| !set.is_empty()) {
             check_trained_values(run, &config)?;
         }
+        let mut weights = None;
         let (model, source) = match (config.model.untrained(&config.data), &run) {
             (Some(model), _) => (model, format!(" of {path}")),
             (None, Some(run)) => {
-                let weights = run.newest_weights()?;
-                (
-                    run.trained_model(&config)?,
-                    format!(", {}", weights.display()),
-                )
+                let saved = run.saved_weights(&config)?;
+                let model = run.model_of(&config, &saved)?;
+                weights = Some(saved.digest);
+                (model, format!(", {}", saved.path.display()))
             }
             (None, None) => {
                 return Err(RunError::Refused(format!(
@@ -92,6 +94,7 @@ impl Subject {
             model,
             run,
             manifest,
+            weights,
         })
     }
 
@@ -118,6 +121,13 @@ impl Subject {
                  them all the same",
                 run.path().display(),
                 differences.join("; ")
+            )));
+        }
+        if self.manifest.is_none() && self.weights.is_some() {
+            return Err(RunError::Refused(format!(
+                "{} has no manifest.json, which says what data it was trained on; put it back, or \
+                 give --other-data",
+                run.path().display()
             )));
         }
         if let Some(manifest) = &self.manifest

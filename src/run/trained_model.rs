@@ -39,8 +39,16 @@ impl RunFolder {
     /// There are no weights, their file is damaged, or they are those of another model than
     /// `config` describes.
     pub fn trained_model(&self, config: &ExperimentConfig) -> Result<Box<dyn Generator>, RunError> {
-        let saved = self.saved_weights(config)?;
-        let model = config.model.trained(&config.name, &saved);
+        self.model_of(config, &self.saved_weights(config)?)
+    }
+
+    /// The model of `config` with weights of the run.
+    pub(super) fn model_of(
+        &self,
+        config: &ExperimentConfig,
+        saved: &SavedWeights,
+    ) -> Result<Box<dyn Generator>, RunError> {
+        let model = config.model.trained(&config.name, saved);
         model.map_err(|error| self.or_other_version(error.into()))
     }
 
@@ -132,11 +140,11 @@ impl RunFolder {
     }
 
     /// Refuses a config that was edited since the weights were trained: what it says of data and
-    /// training would not be theirs.
+    /// training would not be theirs; and weights that are not the training's.
     fn check_unedited(&self, weights: &SavedWeights) -> Result<(), RunError> {
         let trained = self.config_of(weights)?;
-        match &trained.training_differences(&self.config()?)?[..] {
-            [] => Ok(()),
+        match &trained.differences(&self.config()?)?[..] {
+            [] => self.check_end(weights),
             differences => Err(RunError::Refused(format!(
                 "{} was edited since {} was trained ({}; values then, values now); set these back, \
                  and use --set where a command is to take others",
@@ -144,6 +152,21 @@ impl RunFolder {
                 weights.path.display(),
                 differences.join("; ")
             ))),
+        }
+    }
+
+    /// Refuses weights in the place of those with which the run's training ended.
+    fn check_end(&self, weights: &SavedWeights) -> Result<(), RunError> {
+        let ended = self.manifest()?.and_then(|it| it.weights_file_digest);
+        match ended.filter(|_| weights.path == self.weights()) {
+            Some(ended) if ended != weights.digest => Err(RunError::Refused(format!(
+                "{} is not the file with which the training in {} ended (digest {}, the manifest \
+                 says {ended}): it was changed, or is another run's; put it back",
+                weights.path.display(),
+                self.path().display(),
+                weights.digest
+            ))),
+            _ => Ok(()),
         }
     }
 }

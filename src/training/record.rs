@@ -102,6 +102,7 @@ impl<'r> Record<'r> {
         self.manifest.finished = Some(manifest::now());
         if state == RunState::Finished {
             self.manifest.weights_digest = Some(trainer.weights_digest());
+            self.manifest.weights_file_digest = Some(file_digest(&trainer.weights_file()?));
             self.manifest.best_step = self.best_step;
         }
         self.describe(trainer, state)

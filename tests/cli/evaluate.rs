@@ -168,6 +168,86 @@ fn change_weights(run: &Path, change: impl Fn(&mut HashMap<String, (Vec<usize>, 
     });
     let changed = safetensors::serialize(views, header.metadata().clone()).unwrap();
     fs::write(path, changed).unwrap();
+    forget_the_weights_digest(run);
+}
+
+/// As in a run of a version that did not keep it.
+fn forget_the_weights_digest(run: &Path) {
+    let path = run.join("manifest.json");
+    let mut manifest = json(&path);
+    let digest = manifest
+        .as_object_mut()
+        .unwrap()
+        .remove("weights_file_digest");
+    assert!(digest.is_some());
+    fs::write(path, manifest.to_string()).unwrap();
+}
+
+#[test]
+fn weights_that_are_not_those_of_the_trainings_end_are_refused() {
+    let run = copied_run();
+    let path = run.path().join(WEIGHTS);
+    let mut weights = fs::read(&path).unwrap();
+    let last = weights.len() - 1;
+    weights[last] ^= 1;
+    fs::write(&path, &weights).unwrap();
+    let says = "is not the file with which the training in";
+    evaluate(run.path())
+        .assert()
+        .failure()
+        .stderr(contains(says));
+    forget_the_weights_digest(run.path());
+    evaluate(run.path()).assert().success();
+}
+
+#[test]
+fn scores_of_other_weights_than_the_runs_are_not_taken_for_its_own() {
+    let run = copied_run();
+    evaluate(run.path()).assert().success();
+    let path = run.path().join("evaluation_data.json");
+    let mut data = json(&path);
+    let digest = json(&run.path().join("manifest.json"))["weights_file_digest"].clone();
+    assert_eq!(data["weights"], digest);
+    data["weights"] = "of a checkpoint".into();
+    fs::write(path, data.to_string()).unwrap();
+    let says = contains("are scores of other weights than the training ended with");
+    let tables = || {
+        let mut command = keydance("tables");
+        command
+            .arg(run.path())
+            .arg("--out")
+            .arg(run.path().join("tables.md"));
+        command.assert()
+    };
+    tables().failure().stderr(says.clone());
+    keydance("runs").arg(run.path()).assert().stdout(says);
+    evaluate(run.path()).assert().success();
+    tables().success();
+}
+
+#[test]
+fn a_key_that_acts_after_the_network_is_not_edited_in_a_runs_config_either() {
+    let run = copied_run();
+    let path = run.path().join("config.toml");
+    let config = fs::read_to_string(&path).unwrap();
+    let edited = config.replace("velocity_refinement = false", "velocity_refinement = true");
+    assert_ne!(edited, config);
+    fs::write(path, edited).unwrap();
+    evaluate(run.path())
+        .assert()
+        .failure()
+        .stderr(contains("was edited since").and(contains("model.velocity_refinement")));
+}
+
+#[test]
+fn a_run_without_its_manifest_is_used_on_data_only_with_consent() {
+    let run = copied_run();
+    fs::remove_file(run.path().join("manifest.json")).unwrap();
+    evaluate(run.path())
+        .assert()
+        .failure()
+        .stderr(contains("has no manifest.json"));
+    evaluate(run.path()).arg("--other-data").assert().success();
 }
 
 #[test]
@@ -258,7 +338,15 @@ fn data_that_the_run_was_not_trained_on_need_consent() {
         .assert()
         .failure()
         .stderr(contains(digest).and(contains("--other-data")));
-    on_other().arg("--other-data").assert().success();
+    let keeps = contains("none on other data than its own");
+    let output = on_other().arg("--other-data").assert().success();
+    output.stderr(keeps);
+    assert!(!run.path().join("evaluation.json").exists());
+    on_other()
+        .args(["--other-data", "--force"])
+        .assert()
+        .success();
+    assert!(run.path().join("evaluation.json").exists());
 }
 
 #[test]

@@ -464,7 +464,7 @@ fn scores_on_other_clips_take_the_place_of_earlier_ones_with_force_only() {
     done("evaluate run --data data");
     assert_eq!(scores(), own);
     let other = "evaluate run --data data --set data.split.share=0.5 --other-data";
-    assert!(done(other).contains("the run keeps its scores on other clips; --force"));
+    assert!(done(other).contains("the run keeps its scores, and none on other data"));
     assert_eq!(scores(), own);
     done(&format!("{other} --force"));
     assert_ne!(scores(), own);

@@ -507,6 +507,15 @@ fn names_and_seeds_that_no_config_has_are_errors_that_list_those_there_are() {
         let refused = reproduce(place.path()).args(arguments).assert().failure();
         refused.stderr(contains(words).and(contains("whole_model")));
     }
+    let budget = place.path().join("budget.toml");
+    fs::write(
+        &budget,
+        format!("{BUDGET}[rows.two_lstms.schedule]\nfraction = 0.1\n"),
+    )
+    .unwrap();
+    let refused = reproduce_with(place.path(), "budget.toml", &budget).assert();
+    let says = contains("rows two_lstms").and(contains("has no such config"));
+    refused.failure().stderr(says);
     let empty = TempDir::new().unwrap();
     Command::cargo_bin("keydance")
         .unwrap()
@@ -519,6 +528,27 @@ fn names_and_seeds_that_no_config_has_are_errors_that_list_those_there_are() {
         .assert()
         .failure()
         .stderr(contains("holds no config"));
+}
+
+#[test]
+fn a_folder_of_other_files_is_not_taken_for_results_because_rows_are_trained() {
+    let place = TempDir::new().unwrap();
+    for (row, kept) in [
+        ("interpolation", "results"),
+        ("whole_model", "runs/whole_model"),
+    ] {
+        let folder = place.path().join(kept);
+        fs::create_dir_all(&folder).unwrap();
+        fs::create_dir_all(place.path().join("runs/interpolation")).unwrap();
+        fs::write(folder.join("mine.md"), "my own").unwrap();
+        let refused = reproduce(place.path())
+            .args(["--only", row])
+            .assert()
+            .failure();
+        refused.stderr(contains("files"));
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(&folder).unwrap();
+    }
 }
 
 #[test]

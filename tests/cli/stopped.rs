@@ -173,6 +173,58 @@ fn ctrl_c_ends_the_step_saves_and_says_how_to_go_on() {
 }
 
 #[test]
+fn a_training_that_is_stopped_before_its_first_step_says_how_to_begin() {
+    let small = SmallRun::new();
+    let run = small.path("run");
+    // Wide enough for a first step of seconds.
+    let wide = [
+        "model.hidden=512",
+        "model.code=512",
+        "model.feed_forward=512",
+    ];
+    let slow = [
+        "schedule.batch_size=512",
+        "schedule.shards=1",
+        "schedule.fraction=1",
+    ];
+    let sets: Vec<&str> = [wide, slow]
+        .concat()
+        .into_iter()
+        .flat_map(|set| ["--set", set])
+        .collect();
+    let mut child = begin(&small, &run, &sets);
+    while !run.join("config.toml").exists() {
+        sleep(Duration::from_millis(5));
+    }
+    kill(&child, "-TERM");
+    let begun = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < Duration::from_secs(20));
+        sleep(Duration::from_millis(20));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let said = stderr(&output);
+    assert!(
+        said.contains("stopped before a step was done; go on with"),
+        "{said}"
+    );
+    assert!(said.trim_end().ends_with("--resume"), "{said}");
+    assert!(run.join("config.toml").exists() && !run.join("checkpoints").exists());
+}
+
+#[test]
+fn a_training_does_not_write_among_other_files() {
+    let small = SmallRun::new();
+    let run = small.path("run");
+    fs::create_dir(&run).unwrap();
+    fs::write(run.join("loss_curve.svg"), "mine").unwrap();
+    let refused = small.train(&run, &[]);
+    assert!(stderr(&refused).contains("holds other files, such as loss_curve.svg"));
+    assert_eq!(fs::read_dir(&run).unwrap().count(), 1);
+}
+
+#[test]
 fn a_training_whose_messages_nobody_reads_goes_on_to_the_same_bits() {
     let small = SmallRun::new();
     let read = small.train(&small.path("read"), &[]);

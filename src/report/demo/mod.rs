@@ -245,7 +245,7 @@ pub fn compare(
     );
     replace_file(&folder.join(TABLES), tables.markdown(&rows, &subject))?;
     let verdict = demo.verdict(&scores, &others);
-    let data = EvaluatedData::of(dataset, DataPart::Test)?;
+    let data = EvaluatedData::of(dataset, DataPart::Test, None)?;
     EvaluationRecord { scores, data }.write(folder)?;
     Ok((tables.terminal(&rows), verdict))
 }
