@@ -29,7 +29,8 @@ use velocity::VelocityArgs;
 /// Frames are counted from 0 at the run's rate (30 a second unless its config says otherwise): a
 /// file at another rate is resampled first, so frame 120 of the file's own 120 a second is frame 30
 /// here; --own-frames counts as the file does. The result passes through every keyframe; a dance to
-/// --music comes near its key poses, how near is printed. Keyframes of several dancers are put onto the first one's bones.
+/// --music comes near its key poses, how near is printed. Keyframes of several dancers are put onto
+/// the first one's bones.
 ///
 /// Keyframes on a rig other than the dance skeleton are recognised by the names of its joints
 /// (keydance rig prints how), and the result is on that rig, in its file's unit, axis and rate.

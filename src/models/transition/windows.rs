@@ -21,7 +21,8 @@ pub(super) fn cut(transition: usize) -> WindowCut {
     }
 }
 
-/// Windows of `transition + 1` frames of clips with these numbers of frames, see [`cut`].
+/// Windows of `transition + 1` frames of clips with these numbers of frames; one starts every
+/// ceil(0.1 (N + 1)) frames.
 pub fn windows(clip_frames: &[usize], transition: usize) -> Windows {
     let cut = cut(transition);
     Windows {
