@@ -320,6 +320,10 @@ fn wav_files_whose_chunks_are_not_as_they_should_be_are_heard_whole() {
         assert_eq!(heard.samples(), expected.samples(), "{what}");
         assert_eq!(heard.warnings(), Vec::<String>::new(), "{what}");
     }
+    // No samples come however far one looks.
+    let mut zeros = whole[..36].to_vec();
+    zeros.extend(vec![0; 100_000]);
+    assert!(parse(&zeros, "zeros.wav").is_err());
     // Nothing is there but a list behind it.
     let mut empty = wav(&[], 1, RATE);
     empty.extend(b"LIST\x04\0\0\0INFO");
