@@ -55,7 +55,8 @@ pub struct EvaluateArgs {
     /// model.velocity_refinement; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Evaluate on other data than the run was trained on, or split otherwise
+    /// Evaluate on other data than the run was trained on, or split otherwise; the run keeps such
+    /// scores with --force only
     #[arg(long)]
     other_data: bool,
     /// Replace files, and scores on other clips, that are there already

@@ -16,7 +16,7 @@ const INTERRUPTED: u8 = 130;
 /// How long an evaluation may take to end by itself.
 const LATE: Duration = Duration::from_secs(1);
 /// Time between two looks at whether a stop was asked for.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+pub const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Whether the user asked to stop.
 pub struct Stop {

@@ -2,17 +2,13 @@
 
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
 
 use super::progress::Meter;
-use super::stop::Stop;
+use super::stop::{LOOK_EVERY, Stop};
 use crate::data::{DataPart, Dataset, Recording};
 use crate::evaluation::{Evaluation, EvaluationError, Protocol};
 use crate::models::Generator;
 use crate::models::watched::Watched;
-
-/// Time between two looks at whether an evaluation that was stopped has ended.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Evaluates a model and shows on stderr how far it got: with a bar where it is `alone`. Ends early
 /// where `stop` is asked to.
