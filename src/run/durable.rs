@@ -3,10 +3,11 @@
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
 use thiserror::Error;
+
+use super::partial::Partial;
 
 /// A file or folder that could not be dealt with.
 #[derive(Debug, Error)]
@@ -50,16 +51,14 @@ pub(crate) fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), File
             .and_then(|mut file| file.write_all(content.as_ref()))
             .map_err(FileError::at(path, "written"));
     }
-    // A name of its own, as another thread or process may write to the same place.
-    static WRITTEN: AtomicU64 = AtomicU64::new(0);
-    let (process, number) = (std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
-    let partial = real.with_file_name(format!(".keydance.{process}.{number}.partial"));
-    let written = write_synced(&partial, content.as_ref()).and_then(|()| rename(&partial, &real));
-    written.map_err(|error| {
-        // What is left of it takes room on a full disk.
-        let _ = fs::remove_file(&partial);
-        FileError::at(path, "written")(error.cause)
-    })
+    let write = || -> io::Result<()> {
+        let (partial, mut file) = Partial::of(&real)?;
+        file.write_all(content.as_ref())?;
+        file.sync_all()?;
+        partial.become_whole(&real)
+    };
+    write().map_err(FileError::at(path, "written"))?;
+    sync_folder(real.parent().unwrap_or(Path::new("")))
 }
 
 /// Writes JSON for people and scripts, with a final line end, there whole or not at all.

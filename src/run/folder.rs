@@ -10,6 +10,7 @@
 //! .lock                  locked while a training writes here
 //! ```
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -20,6 +21,7 @@ use super::error::RunError;
 use super::lock::{FolderLock, LOCK};
 use super::log::{self, LogLine};
 use super::manifest::{self, Build, Manifest};
+use super::partial::Partial;
 use crate::experiment::ExperimentConfig;
 
 const MANIFEST: &str = "manifest.json";
@@ -187,7 +189,9 @@ impl RunFolder {
         self.check_new()?;
         let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
         let mut names = entries.map(|entry| entry.file_name());
-        match names.find(|name| name != LOCK) {
+        // A process that was killed may have left the beginning of the config.
+        let is_own = |name: &OsString| name == LOCK || Partial::is_name(&name.to_string_lossy());
+        match names.find(|name| !is_own(name)) {
             None => Ok(()),
             Some(name) => Err(RunError::Refused(format!(
                 "{} holds other files, such as {}; give another --out",

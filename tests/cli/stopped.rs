@@ -222,6 +222,13 @@ fn a_training_does_not_write_among_other_files() {
     let refused = small.train(&run, &[]);
     assert!(stderr(&refused).contains("holds other files, such as loss_curve.svg"));
     assert_eq!(fs::read_dir(&run).unwrap().count(), 1);
+    // What a process that was killed left of its config is no other file, and is taken away.
+    let killed = small.path("killed");
+    let left = killed.join(".config.toml.1-0.partial");
+    fs::create_dir(&killed).unwrap();
+    fs::write(&left, "name =").unwrap();
+    digest(&small.train(&killed, &["--set", "schedule.fraction=0.05"]));
+    assert!(!left.exists());
 }
 
 #[test]

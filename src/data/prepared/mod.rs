@@ -10,7 +10,6 @@
 //! All numbers are little-endian, so that poses are those of the folder to the bit.
 
 mod contents;
-mod partial;
 mod stored;
 mod write;
 

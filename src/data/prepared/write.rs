@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 
 use super::contents::{Contents, Entry, JointEntry, Preparation};
-use super::partial::Partial;
 use super::stored::{encoded, frames_in_bytes};
 use super::{MAGIC, VERSION, check_motions_alone, is_prepared, open};
 use crate::data::config::DataConfig;
@@ -20,6 +19,7 @@ use crate::data::reading::grouped;
 use crate::data::source::ClipSource;
 use crate::data::twins::twins;
 use crate::motion::Clip;
+use crate::run::Partial;
 
 /// Clips that are read at a time, for every thread.
 const AT_ONCE: usize = 4;
