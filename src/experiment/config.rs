@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::DataConfig;
 use crate::evaluation::{EvaluationOptions, PrintedError, PrintedTables, Protocol};
+use crate::models::Paper;
 use crate::models::registry;
-use crate::models::settings::{ModelSettings, Paper, ValueError};
+use crate::models::settings::{ModelSettings, ValueError};
 use crate::optim::AdamConfig;
 
 /// Longest window that a config may name, frames.

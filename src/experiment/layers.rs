@@ -11,8 +11,8 @@ use thiserror::Error;
 use toml::{Table, Value};
 
 use super::config::{ExperimentConfig, Shared};
+use crate::models::ModelKind;
 use crate::models::registry;
-use crate::models::settings::ModelKind;
 use crate::motion::{Mapping, MappingError};
 
 /// The key that names the file that a config overrides.

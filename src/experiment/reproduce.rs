@@ -23,27 +23,35 @@ use crate::training::{Outcome, Resumed, StepReport, Trainer, TrainingError};
 /// An error of a method ends the reproduction: what it says cannot be written any more.
 pub trait Observer: Sync {
     /// Row `number` of `of`, counted from 1, begins.
-    fn row(&self, row: &Row, number: usize, of: usize) -> io::Result<()>;
+    fn row(&self, _row: &Row, _number: usize, _of: usize) -> io::Result<()> {
+        Ok(())
+    }
 
     /// What became of the row at hand without any work.
-    fn note(&self, note: &str) -> io::Result<()>;
+    fn note(&self, _note: &str) -> io::Result<()> {
+        Ok(())
+    }
 
     /// Something that the user should know of.
-    fn warning(&self, warning: &str);
+    fn warning(&self, _warning: &str) {}
 
     /// The training of a row diverged; the other rows go on.
-    fn diverged(&self, row: &Row, error: &TrainingError);
+    fn diverged(&self, _row: &Row, _error: &TrainingError) {}
 
     /// A training is about to begin or to go on.
-    fn training(&self, trainer: &Trainer<'_>) -> io::Result<()>;
+    fn training(&self, _trainer: &Trainer<'_>) -> io::Result<()> {
+        Ok(())
+    }
 
     /// A training goes on after what `resumed` says; the result is told each of its steps.
     fn steps(
         &self,
-        row: &Row,
-        trainer: &Trainer<'_>,
-        resumed: &Resumed,
-    ) -> io::Result<StepObserver>;
+        _row: &Row,
+        _trainer: &Trainer<'_>,
+        _resumed: &Resumed,
+    ) -> io::Result<StepObserver> {
+        Ok(Box::new(|_| {}))
+    }
 
     /// Evaluates a model on the test clips as `protocol` says: whoever shows how far that is wraps
     /// the model.
@@ -57,7 +65,9 @@ pub trait Observer: Sync {
     }
 
     /// Whether to stop after the step, or in the evaluation, at hand.
-    fn stop_asked(&self) -> bool;
+    fn stop_asked(&self) -> bool {
+        false
+    }
 }
 
 /// Is told each step of a training.

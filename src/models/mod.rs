@@ -27,6 +27,7 @@ pub mod gradient_report;
 #[cfg(feature = "papers")]
 pub mod harvey2020;
 pub mod inference;
+pub mod kind;
 #[cfg(feature = "papers")]
 pub mod li2023;
 #[cfg(feature = "papers")]
@@ -55,7 +56,8 @@ pub mod weights;
 #[cfg(feature = "papers")]
 pub use forms::AugmentationConfig;
 pub use generator::{Generator, ModelError, Motion, Request};
-pub use settings::{ModelKind, ModelSettings, Paper, TaskSetting};
+pub use kind::{KindOf, ModelKind, Paper};
+pub use settings::{ModelSettings, TaskSetting};
 pub use shards::Shards;
 pub use statistics::Statistics;
 pub use streams::Streams;

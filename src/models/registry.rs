@@ -2,20 +2,13 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use super::settings::{ModelKind, Paper};
+use super::{ModelKind, Paper};
 #[cfg(feature = "papers")]
 use super::{
-    baselines::{
-        linear_gaussian::LinearGaussianKind, retrieval::KeyPoseRetrievalKind,
-        rotations::RotationBaseline,
-    },
-    duan2022::Duan2022Kind,
-    harvey2020::Harvey2020RotationsKind,
-    li2023::Li2023Kind,
-    moglow2020::Moglow2020Kind,
-    pu2022::Pu2022Kind,
+    baselines::{linear_gaussian, retrieval, rotations::RotationBaseline},
+    duan2022, harvey2020, li2023, moglow2020, pu2022,
     transition::Kind,
-    valleperez2021::Valleperez2021Kind,
+    valleperez2021,
 };
 
 /// Kinds that were [added](add) from outside.
@@ -29,17 +22,17 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         #[cfg(feature = "papers")]
         Arc::new(Kind::Harvey2020),
         #[cfg(feature = "papers")]
-        Arc::new(Li2023Kind),
+        Arc::new(li2023::KIND),
         #[cfg(feature = "papers")]
-        Arc::new(Duan2022Kind),
+        Arc::new(duan2022::KIND),
         #[cfg(feature = "papers")]
-        Arc::new(Harvey2020RotationsKind),
+        Arc::new(harvey2020::ROTATIONS),
         #[cfg(feature = "papers")]
-        Arc::new(Pu2022Kind),
+        Arc::new(pu2022::KIND),
         #[cfg(feature = "papers")]
-        Arc::new(Valleperez2021Kind),
+        Arc::new(valleperez2021::KIND),
         #[cfg(feature = "papers")]
-        Arc::new(Moglow2020Kind),
+        Arc::new(moglow2020::KIND),
         #[cfg(feature = "papers")]
         Arc::new(Kind::Interpolation),
         #[cfg(feature = "papers")]
@@ -55,9 +48,9 @@ fn built_in() -> Vec<Arc<dyn ModelKind>> {
         #[cfg(feature = "papers")]
         Arc::new(RotationBaseline::HeldSeed),
         #[cfg(feature = "papers")]
-        Arc::new(KeyPoseRetrievalKind),
+        Arc::new(retrieval::KIND),
         #[cfg(feature = "papers")]
-        Arc::new(LinearGaussianKind),
+        Arc::new(linear_gaussian::KIND),
     ]
 }
 

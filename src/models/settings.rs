@@ -1,10 +1,10 @@
-//! What the commands ask of a kind of model: to read its part of a config, and to build what that
-//! describes.
+//! What the commands ask of a model as a config describes it: to be checked, and to be built.
 
 use std::any::Any;
 use std::fmt;
 
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use thiserror::Error;
 use toml::Table;
 
@@ -13,69 +13,14 @@ use super::weights::{SavedWeights, WeightsError};
 use super::{Generator, ModelError, Streams, Task};
 use crate::autograd::check::CheckReport;
 use crate::data::{DataConfig, Dataset};
-use crate::evaluation::{EvaluationOptions, Protocol};
 use crate::nn::Initialiser;
-use crate::report::demo::OpenDemo;
-use crate::report::figures::DrawFigures;
 
 /// What draws a model's initial weights.
 pub type InitialRng = ChaCha8Rng;
 
-/// A paper that models belong to.
-#[derive(Debug, Clone, Copy)]
-pub struct Paper {
-    /// Name of its folders, such as `pan2021`.
-    pub name: &'static str,
-    /// The numbers that it prints, TOML: see [`crate::evaluation::PrintedTables`].
-    pub printed: &'static str,
-    /// What draws its figures.
-    pub figures: Option<DrawFigures>,
-    /// What shows its model without data.
-    pub demo: Option<OpenDemo>,
-    /// How its tables score a model, for data that is read like this. The first protocol also
-    /// scores a training on validation clips.
-    pub protocols: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,
-    /// Further ways to score one, which no table has: only where they are asked for by name.
-    pub by_name: fn(&DataConfig, &EvaluationOptions) -> Vec<Box<dyn Protocol>>,
-}
-
-/// A kind of model: what a config's `model.kind` names.
-pub trait ModelKind: Send + Sync {
-    /// Its name in a config.
-    fn name(&self) -> &str;
-
-    /// The name of an experiment that gives none.
-    fn default_name(&self) -> &str {
-        self.name()
-    }
-
-    /// The papers whose tables and figures its models may stand in, by a config's `paper`: the
-    /// first where a config names none.
-    fn papers(&self) -> Vec<Paper>;
-
-    /// The tables of a config that are its own, `[model]` among them, with the default of every
-    /// key.
-    fn defaults(&self) -> Table;
-
-    /// Reads these tables.
-    ///
-    /// # Errors
-    /// A key that it does not know, or a value of the wrong kind.
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error>;
-
-    /// Gives keys of earlier versions their present names, in one layer of a config.
-    fn rename_former_keys(&self, _layer: &mut Table) {}
-}
-
 /// A model as a config describes it.
-pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
+pub trait ModelSettings: Tables + Any + Send + Sync + fmt::Debug {
     fn kind(&self) -> &str;
-
-    /// Every key of its tables with its value.
-    ///
-    /// # Errors
-    /// A number that TOML does not have.
-    fn tables(&self) -> Result<Table, toml::ser::Error>;
 
     /// Checks values against each other and against how the data is read.
     ///
@@ -173,8 +118,27 @@ pub trait ModelSettings: Any + Send + Sync + fmt::Debug {
     ) -> Result<ExportedBatch, LoadError> {
         Err(lacks(self.kind(), "batch to export").into())
     }
+}
+
+/// What settings have by being written to TOML and cloned.
+pub trait Tables {
+    /// Every key of its tables with its value.
+    ///
+    /// # Errors
+    /// A number that TOML does not have.
+    fn tables(&self) -> Result<Table, toml::ser::Error>;
 
     fn clone_box(&self) -> Box<dyn ModelSettings>;
+}
+
+impl<S: ModelSettings + Serialize + Clone> Tables for S {
+    fn tables(&self) -> Result<Table, toml::ser::Error> {
+        Table::try_from(self)
+    }
+
+    fn clone_box(&self) -> Box<dyn ModelSettings> {
+        Box::new(self.clone())
+    }
 }
 
 /// The error of a model that is to be trained and needs no training.

@@ -8,7 +8,6 @@ mod thread_ranks;
 mod toy;
 
 use std::fs;
-use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Once};
@@ -16,18 +15,16 @@ use std::sync::{Arc, Once};
 use keydance::data::choreography::{ChoreographyConfig, generate};
 use keydance::data::{DataPart, Dataset};
 use keydance::evaluation::EvaluationRecord;
-use keydance::experiment::{
-    Ending, ExperimentConfig, Observer, Reproduction, Row, StepObserver, rows,
-};
+use keydance::experiment::{Ending, ExperimentConfig, Observer, Reproduction, rows};
 use keydance::models::settings::GradientCheckOptions;
 use keydance::models::{Request, registry};
 use keydance::ranks::Alone;
 use keydance::run::{RunFolder, Subject};
 use keydance::step::measure::step_speed;
-use keydance::training::{Outcome, Resumed, Trainer, TrainingError};
+use keydance::training::{Outcome, Trainer};
 use tempfile::TempDir;
 use thread_ranks::on_each;
-use toy::{ToyKind, question};
+use toy::{TOY, question};
 
 const CONFIG: &str = "name = 'toy'\n[data]\nsplit = { share = 0.7 }\n[model]\nkind = 'toy'\n\
     [optimiser]\nlearning_rate = 0.1\n[checkpoint]\nevery_steps = 7\n";
@@ -35,7 +32,7 @@ const CONFIG: &str = "name = 'toy'\n[data]\nsplit = { share = 0.7 }\n[model]\nki
 /// A folder of configs with the toy's, which is added to the registry.
 fn configs() -> TempDir {
     static ADDED: Once = Once::new();
-    ADDED.call_once(|| registry::add(ToyKind));
+    ADDED.call_once(|| registry::add(TOY));
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("toy.toml"), CONFIG).unwrap();
     folder
@@ -167,39 +164,10 @@ fn it_is_evaluated_by_its_own_metrics_and_generates_from_a_seed() {
     assert_eq!(error, "toy needs the music");
 }
 
-/// Listens to a reproduction and says nothing.
+/// Says nothing.
 struct Silent;
 
-impl Observer for Silent {
-    fn row(&self, _row: &Row, _number: usize, _of: usize) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn note(&self, _note: &str) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn warning(&self, _warning: &str) {}
-
-    fn diverged(&self, _row: &Row, _error: &TrainingError) {}
-
-    fn training(&self, _trainer: &Trainer<'_>) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn steps(
-        &self,
-        _row: &Row,
-        _trainer: &Trainer<'_>,
-        _resumed: &Resumed,
-    ) -> io::Result<StepObserver> {
-        Ok(Box::new(|_| {}))
-    }
-
-    fn stop_asked(&self) -> bool {
-        false
-    }
-}
+impl Observer for Silent {}
 
 #[test]
 fn its_rows_are_reproduced_into_tables_beside_what_it_prints() {

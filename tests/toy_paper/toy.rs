@@ -13,7 +13,7 @@ use keydance::models::generator::{Condition, Given, NeededPoses, Needs};
 use keydance::models::settings::{InitialRng, LoadError, ValueError};
 use keydance::models::weights::SavedWeights;
 use keydance::models::{
-    Generator, LossTerms, ModelError, ModelKind, ModelSettings, Motion, Paper, Request, Statistics,
+    Generator, KindOf, LossTerms, ModelError, ModelSettings, Motion, Paper, Request, Statistics,
     Step, Streams, Task, TaskSetting,
 };
 use keydance::nn::Initialiser;
@@ -21,20 +21,19 @@ use ndarray::{Array2, Array3, s};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 /// Frames of a window.
 const WINDOW: usize = 20;
 /// Share of a batch's mean that the running mean takes up.
 const MOMENTUM: f64 = 0.1;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Toy {
     model: Sizes,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Sizes {
     kind: String,
@@ -54,42 +53,17 @@ impl Default for Sizes {
 }
 
 /// The line of the registry.
-pub struct ToyKind;
-
-impl ModelKind for ToyKind {
-    fn name(&self) -> &str {
-        "toy"
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![Paper {
-            name: "toy2026",
-            printed: "title = 'Toy 2026'\ncolumns = ['all']\n[[tables]]\nnumber = 1\nmetric = 'nll'\n\
-                [rows.toy]\ntitle = 'Toy'\nnll = [2.5]",
-            figures: None,
-            demo: None,
-            by_name: |_, _| Vec::new(),
-            protocols: |_, _| vec![Box::new(ToyProtocol)],
-        }]
-    }
-
-    fn defaults(&self) -> Table {
-        let model = Sizes::default();
-        Table::try_from(Toy { model }).unwrap()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Toy>()?))
-    }
-}
+pub const TOY: KindOf<Toy> = KindOf::new("toy", || {
+    let printed = "title = 'Toy 2026'\ncolumns = ['all']\n[[tables]]\nnumber = 1\nmetric = 'nll'\n\
+        [rows.toy]\ntitle = 'Toy'\nnll = [2.5]";
+    vec![Paper::new("toy2026", printed, |_, _| {
+        vec![Box::new(ToyProtocol)]
+    })]
+});
 
 impl ModelSettings for Toy {
     fn kind(&self) -> &str {
         "toy"
-    }
-
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
     }
 
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
@@ -116,10 +90,6 @@ impl ModelSettings for Toy {
         let weights = Weights::new(&mut Initialiser::new(&mut parameters, rng));
         saved.load_into(&mut parameters, &Statistics::default())?;
         Ok(Box::new(TrainedToy::new(name, &weights, &parameters)))
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

@@ -1,7 +1,7 @@
 //! The paper that the protocol belongs to.
 
 use super::MusicDance;
-use crate::models::settings::Paper;
+use crate::models::Paper;
 use crate::report::figures::pu2022::draw;
 
 /// Pu and Shan: music-driven dance regeneration with controllable key pose constraints (2022).

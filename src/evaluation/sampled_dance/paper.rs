@@ -1,7 +1,7 @@
 //! The paper that the protocols belong to.
 
 use super::{Likelihood, SampledDance};
-use crate::models::settings::Paper;
+use crate::models::Paper;
 
 /// Valle-Pérez et al.: Transflower (2021).
 pub const VALLEPEREZ2021: Paper = Paper {

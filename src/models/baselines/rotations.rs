@@ -8,8 +8,9 @@ use toml::Table;
 use crate::data::DataConfig;
 use crate::evaluation::music_dance::PU2022;
 use crate::models::generator::{Condition, Motion, NeededPoses, Needs, Request};
+use crate::models::kind::{ModelKind, Paper};
 use crate::models::li2023;
-use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::settings::ModelSettings;
 use crate::models::{Generator, ModelError};
 use crate::motion::Pose;
 
@@ -83,16 +84,8 @@ impl ModelSettings for Settings {
         self.model.kind.title()
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         Some(Box::new(self.model.kind))
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

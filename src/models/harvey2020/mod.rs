@@ -61,7 +61,6 @@ mod transitions;
 
 pub use config::{HarveyLossWeights, RecurrentConfig};
 pub use rotations::{
-    Harvey2020Rotations, Harvey2020RotationsConfig, Harvey2020RotationsKind,
-    Harvey2020RotationsSettings,
+    Harvey2020Rotations, Harvey2020RotationsConfig, Harvey2020RotationsSettings, KIND as ROTATIONS,
 };
 pub use transitions::{Harvey2020, Harvey2020Config};

@@ -2,7 +2,6 @@
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use super::config::RecurrentConfig;
 use super::given::{GivenState, GivenWindows, Recorded};
@@ -11,11 +10,12 @@ use super::network::RecurrentNetwork;
 use crate::autograd::{AutogradError, Real, Tape};
 use crate::data::DataConfig;
 use crate::models::AugmentationConfig;
+use crate::models::kind::KindOf;
 use crate::models::rotations::{
     Batch, Body, Prediction, RootSource, RotationNetwork, RotationSettings, ScheduleConfig,
     WindowStatistics,
 };
-use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
+use crate::models::settings::ValueError;
 use crate::models::transition::RootFrame;
 use crate::models::{LossTerms, ModelError, li2023};
 use crate::motion::rotation_window::Interpolation;
@@ -23,31 +23,11 @@ use crate::motion::{ContactRule, Feet};
 use crate::nn::Initialiser;
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Harvey2020RotationsKind;
-
-impl ModelKind for Harvey2020RotationsKind {
-    fn name(&self) -> &str {
-        Harvey2020RotationsSettings::KIND
-    }
-
-    fn default_name(&self) -> &str {
-        "harvey"
-    }
-
-    fn papers(&self) -> Vec<Paper> {
+pub const KIND: KindOf<Harvey2020RotationsSettings> =
+    KindOf::new(Harvey2020RotationsSettings::KIND, || {
         vec![li2023::DANCE, li2023::LAFAN1]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves.
-        Table::try_from(Harvey2020RotationsSettings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Harvey2020RotationsSettings>()?))
-    }
-}
+    })
+    .called("harvey");
 
 /// All tables.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

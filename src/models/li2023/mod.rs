@@ -21,55 +21,31 @@ pub use losses::losses;
 pub use network::{Li2023, Output};
 pub use root::reconstruct_root;
 
-use toml::Table;
-
 use crate::evaluation::in_betweening::InBetweening;
-use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::kind::{KindOf, Paper};
+use crate::models::rotations::RotationSettings as _;
 use crate::report::figures::li2023 as figures;
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Li2023Kind;
-
-impl ModelKind for Li2023Kind {
-    fn name(&self) -> &str {
-        "li2023"
-    }
-
-    fn default_name(&self) -> &str {
-        "ours"
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![DANCE, LAFAN1]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves.
-        Table::try_from(Li2023Settings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Li2023Settings>()?))
-    }
-}
+pub const KIND: KindOf<Li2023Settings> =
+    KindOf::new(Li2023Settings::KIND, || vec![DANCE, LAFAN1]).called("ours");
 
 /// The paper's tables on its dance data.
 pub const DANCE: Paper = Paper {
-    name: "li2023",
-    printed: include_str!("../../../experiments/li2023/paper.toml"),
     figures: Some(figures::draw),
-    demo: None,
-    by_name: |_, _| Vec::new(),
-    protocols: |data, options| vec![Box::new(InBetweening::dance(data, options))],
+    ..Paper::new(
+        "li2023",
+        include_str!("../../../experiments/li2023/paper.toml"),
+        |data, options| vec![Box::new(InBetweening::dance(data, options))],
+    )
 };
 
 /// The paper's tables on LaFAN1.
 pub const LAFAN1: Paper = Paper {
-    name: "li2023_lafan1",
-    printed: include_str!("../../../experiments/li2023_lafan1/paper.toml"),
     figures: Some(figures::draw),
-    demo: None,
-    by_name: |_, _| Vec::new(),
-    protocols: |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
+    ..Paper::new(
+        "li2023_lafan1",
+        include_str!("../../../experiments/li2023_lafan1/paper.toml"),
+        |data, options| vec![Box::new(InBetweening::lafan1(data, options))],
+    )
 };

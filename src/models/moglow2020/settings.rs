@@ -3,7 +3,6 @@
 use ndarray::{Array2, s};
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use toml::Table;
 
 use super::config::MoglowSettings;
 use super::flow::{Moglow2020, SequenceBatch};
@@ -151,10 +150,6 @@ impl ModelSettings for MoglowSettings {
         "moglow2020"
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
         self.check_values()
     }
@@ -265,10 +260,6 @@ impl ModelSettings for MoglowSettings {
         };
         results.map_err(|error| ModelError::data(&error))?;
         Ok(exported)
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

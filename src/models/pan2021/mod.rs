@@ -31,7 +31,7 @@ use crate::evaluation::exports::Exports;
 use crate::evaluation::published::Published;
 use crate::evaluation::transitions::TransitionScoring;
 use crate::evaluation::{EvaluationOptions, Protocol};
-use crate::models::settings::Paper;
+use crate::models::Paper;
 
 /// The paper, the numbers that it prints and how they are counted.
 pub const PAPER: Paper = Paper {

@@ -30,30 +30,8 @@ pub use generator::TrainedPu2022;
 pub use network::Pu2022;
 pub use window::{WindowFrame, pose_of};
 
-use toml::Table;
-
 use crate::evaluation::music_dance::PU2022;
-use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::kind::KindOf;
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pu2022Kind;
-
-impl ModelKind for Pu2022Kind {
-    fn name(&self) -> &str {
-        "pu2022"
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![PU2022]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves.
-        Table::try_from(Pu2022Settings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Pu2022Settings>()?))
-    }
-}
+pub const KIND: KindOf<Pu2022Settings> = KindOf::new("pu2022", || vec![PU2022]);

@@ -3,7 +3,6 @@
 use ndarray::Array2;
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use toml::Table;
 
 use super::batch::Batch;
 use super::clips::{MusicStatistics, RecordedWindow, TrainingClip, draw, draw_keys, music_of};
@@ -153,10 +152,6 @@ impl ModelSettings for Pu2022Settings {
         "pu2022"
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
         self.check_values()
     }
@@ -258,10 +253,6 @@ impl ModelSettings for Pu2022Settings {
         };
         results.map_err(|error| ModelError::data(&error))?;
         Ok(exported)
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

@@ -4,7 +4,6 @@ use std::fmt::Debug;
 
 use rand::Rng;
 use serde::Serialize;
-use toml::Table;
 
 use super::exported_batch;
 use super::gradient_check;
@@ -117,10 +116,6 @@ impl<S: RotationSettings> ModelSettings for S {
         S::KIND
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, data: &DataConfig) -> Result<(), ValueError> {
         self.schedule().check()?;
         self.augmentation().check()?;
@@ -186,9 +181,5 @@ impl<S: RotationSettings> ModelSettings for S {
             true => gradient_check::check_all(self, options),
             false => gradient_check::check_all(&self.small(), options),
         }
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }

@@ -11,8 +11,9 @@ use crate::models::baselines::interpolation::Interpolation;
 use crate::models::baselines::linear_positions::LinearPositions;
 use crate::models::baselines::zero_velocity::ZeroVelocity;
 use crate::models::harvey2020::{Harvey2020, Harvey2020Config};
+use crate::models::kind::{ModelKind, Paper};
 use crate::models::pan2021::{Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
-use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError, without_weights};
+use crate::models::settings::{ModelSettings, ValueError, without_weights};
 use crate::models::{Generator, ModelError, li2023};
 use crate::motion::Mapping;
 use crate::nn::Initialiser;
@@ -73,7 +74,7 @@ impl ModelKind for Kind {
             ..TransitionSettings::default()
         };
         // The defaults hold numbers that TOML has, which a test proves of every kind.
-        settings.tables().unwrap_or_default()
+        Table::try_from(settings).unwrap_or_default()
     }
 
     fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {

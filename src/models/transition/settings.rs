@@ -4,7 +4,6 @@
 use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use super::exported_batch;
 use super::gradient_check::{self, GradientCheckError};
@@ -103,10 +102,6 @@ impl ModelSettings for TransitionSettings {
         self.model.kind()
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, data: &DataConfig) -> Result<(), ValueError> {
         self.schedule.check()?;
         let decay = self.scheduled_sampling.decay;
@@ -195,10 +190,6 @@ impl ModelSettings for TransitionSettings {
         let clips = clips.into_iter().collect::<Result<Vec<_>, _>>()?;
         let root_frame = self.model.root_frame();
         Ok(exported_batch::export(&model, root_frame, &clips, options)?)
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

@@ -28,34 +28,9 @@ pub use generator::TrainedValleperez;
 pub use network::{Valleperez2021, WindowBatch};
 pub use target::Target;
 
-use toml::Table;
-
 use crate::evaluation::sampled_dance::VALLEPEREZ2021;
-use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::kind::KindOf;
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Valleperez2021Kind;
-
-impl ModelKind for Valleperez2021Kind {
-    fn name(&self) -> &str {
-        "valleperez2021"
-    }
-
-    fn default_name(&self) -> &str {
-        "transflower"
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![VALLEPEREZ2021]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves.
-        Table::try_from(ValleperezSettings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<ValleperezSettings>()?))
-    }
-}
+pub const KIND: KindOf<ValleperezSettings> =
+    KindOf::new("valleperez2021", || vec![VALLEPEREZ2021]).called("transflower");

@@ -3,7 +3,6 @@
 use ndarray::{Array2, ArrayView2, s};
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use toml::Table;
 
 use super::config::{Head, TargetKind, ValleperezSettings};
 use super::generator::{Reference, TrainedValleperez};
@@ -161,10 +160,6 @@ impl ModelSettings for ValleperezSettings {
         "valleperez2021"
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
         self.check_values()
     }
@@ -282,10 +277,6 @@ impl ModelSettings for ValleperezSettings {
             exported.add("target.log_deviations", &[1], &[log_deviations]);
         }
         Ok(exported)
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 

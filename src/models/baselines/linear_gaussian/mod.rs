@@ -9,33 +9,11 @@ mod fit;
 mod generator;
 mod settings;
 
-use toml::Table;
-
 use crate::evaluation::sampled_dance::VALLEPEREZ2021;
-use crate::models::settings::{ModelKind, ModelSettings, Paper};
+use crate::models::kind::KindOf;
 use settings::Settings;
 
 const NAME: &str = "linear_gaussian";
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LinearGaussianKind;
-
-impl ModelKind for LinearGaussianKind {
-    fn name(&self) -> &str {
-        NAME
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![VALLEPEREZ2021]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves of every kind.
-        Table::try_from(Settings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Settings>()?))
-    }
-}
+pub(in crate::models) const KIND: KindOf<Settings> = KindOf::new(NAME, || vec![VALLEPEREZ2021]);

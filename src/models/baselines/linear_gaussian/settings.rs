@@ -1,7 +1,6 @@
 //! Its tables of a config.
 
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use super::NAME;
 use super::generator::LinearGaussian;
@@ -110,10 +109,6 @@ impl ModelSettings for Settings {
         NAME
     }
 
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
-    }
-
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
         let model = &self.model;
         let within = |key: &'static str, value: usize, least: usize| {
@@ -141,9 +136,5 @@ impl ModelSettings for Settings {
 
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
         Some(Box::new(LinearGaussian::new(self.clone())))
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }

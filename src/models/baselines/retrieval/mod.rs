@@ -10,12 +10,12 @@ mod placed;
 use ndarray::Array3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use crate::data::{DataConfig, Recording};
 use crate::evaluation::music_dance::PU2022;
 use crate::models::generator::{Condition, Motion, NeededPoses, Needs, Request};
-use crate::models::settings::{ModelKind, ModelSettings, Paper, ValueError};
+use crate::models::kind::KindOf;
+use crate::models::settings::{ModelSettings, ValueError};
 use crate::models::{Generator, ModelError};
 use crate::motion::Pose;
 use library::Library;
@@ -24,13 +24,12 @@ use placed::placed;
 const NAME: &str = "key_pose_retrieval";
 
 /// The line of the registry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct KeyPoseRetrievalKind;
+pub(in crate::models) const KIND: KindOf<Settings> = KindOf::new(NAME, || vec![PU2022]);
 
 /// Its table of a config.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Settings {
+pub(in crate::models) struct Settings {
     model: KeyPoseRetrievalConfig,
 }
 
@@ -53,32 +52,9 @@ impl Default for KeyPoseRetrievalConfig {
     }
 }
 
-impl ModelKind for KeyPoseRetrievalKind {
-    fn name(&self) -> &str {
-        NAME
-    }
-
-    fn papers(&self) -> Vec<Paper> {
-        vec![PU2022]
-    }
-
-    fn defaults(&self) -> Table {
-        // The defaults hold numbers that TOML has, which a test proves of every kind.
-        Table::try_from(Settings::default()).unwrap_or_default()
-    }
-
-    fn read(&self, tables: Table) -> Result<Box<dyn ModelSettings>, toml::de::Error> {
-        Ok(Box::new(tables.try_into::<Settings>()?))
-    }
-}
-
 impl ModelSettings for Settings {
     fn kind(&self) -> &str {
         NAME
-    }
-
-    fn tables(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self)
     }
 
     fn check(&self, _data: &DataConfig) -> Result<(), ValueError> {
@@ -92,10 +68,6 @@ impl ModelSettings for Settings {
             blend_frames: self.model.blend_frames,
             library: None,
         }))
-    }
-
-    fn clone_box(&self) -> Box<dyn ModelSettings> {
-        Box::new(self.clone())
     }
 }
 
