@@ -115,9 +115,9 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
         evaluated => evaluated?,
     };
     write!(out, "{}", scoring.terminal(&record)?)?;
-    scoring.keep(&record)?;
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
+    scoring.keep(&record)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -166,6 +166,13 @@ impl EvaluationRecord {
             scores: read_json(folder, scores)?,
             data: read_json(folder, data)?,
         };
+        if record.scores.most_windows() == 0 {
+            return Err(RecordError::Refused(format!(
+                "{} holds no scores; to get some, {}",
+                folder.join(scores).display(),
+                remedy(folder)
+            )));
+        }
         if !record.data.part.is_test() {
             return Err(RecordError::Refused(format!(
                 "{} are scores on {} clips, not on the test clips; to get those, {}",

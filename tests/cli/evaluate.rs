@@ -459,6 +459,10 @@ fn tables_set_runs_beside_the_paper_and_say_their_budget() {
     let difference = format!("{:+.2}", lrp - 124.47);
     assert!(text.contains(&difference), "{difference}: {text}");
     assert!(!text.contains("windows of each length"), "{text}");
+    fs::write(run.path().join("evaluation.json"), "{}").unwrap();
+    let emptied = make().arg("--force").assert().failure();
+    emptied.stderr(contains("holds no scores; to get some"));
+    assert_eq!(fs::read_to_string(&tables).unwrap(), text);
 }
 
 #[test]

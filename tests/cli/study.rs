@@ -233,6 +233,9 @@ fn what_makes_no_study_is_said_and_nothing_is_written() {
     let name = of("bvh").unwrap().file_name().unwrap().to_str().unwrap();
     refused(&SILENT, &format!("Hopper lacks {name}, which Lovelace has"));
     fs::copy(dances.path("first").join(name), of("bvh").unwrap()).unwrap();
+    fs::write(of("wav").unwrap(), "no sound").unwrap();
+    let music = dances.path("second").display().to_string();
+    refused(&["--music", &music], "not wav, flac, mp3 or ogg");
     fs::remove_file(of("wav").unwrap()).unwrap();
     let music = dances.path("second").display().to_string();
     refused(&["--music", &music], &format!("holds no music of {name}"));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::data::DataError;
 use crate::motion::bvh::BvhError;
+use crate::music::MusicError;
 use crate::report::{FigureError, ReportError};
 use crate::run::FileError;
 
@@ -20,6 +21,8 @@ pub enum StudyError {
     },
     #[error("the music of the study")]
     Music(#[source] Box<DataError>),
+    #[error(transparent)]
+    Sound(#[from] MusicError),
     #[error("{file} is not the key of a study; give the key.json that lies beside its page")]
     Key {
         file: PathBuf,

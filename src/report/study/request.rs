@@ -11,6 +11,7 @@ use super::{Question, StudyClip, StudyError, StudyKey, StudyModel};
 use crate::counted::counted;
 use crate::data::{DataConfig, FileReading, hexadecimal};
 use crate::motion::{Clip, bvh};
+use crate::music;
 use crate::report::viewer::Sound;
 
 /// A piece of a dance that is shorter cannot be rated, s.
@@ -63,6 +64,9 @@ impl StudyRequest {
         for stimulus in &stimuli {
             let dances = self.read(stimulus, &mut notices)?;
             if let Some(file) = &stimulus.sound {
+                let heard = music::read(file)?;
+                let odd = heard.warnings().iter();
+                notices.extend(odd.map(|warning| format!("{} {warning}", file.display())));
                 songs.push(sound.source(file).map_err(Box::new)?);
             }
             let song = stimulus.sound.as_ref().map(|_| songs.len() - 1);
