@@ -16,8 +16,8 @@ use crate::experiment::EvaluatedRun;
 use crate::report::figures::{FigureRequest, drawing_of, write_all};
 use crate::run::{Subject, check_output_folder, check_outputs_beside, replace_file};
 
-/// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021, 3 to 10 of Li et al., 4
-/// to 9 of Pu and Shan, 3 of Valle-Pérez et al.
+/// Draw the figures of the model's paper: 4 (b) to 12 of Pan et al. 2021 (13 of its cyclic motion),
+/// 3 to 10 of Li et al., 4 to 9 of Pu and Shan, 3 of Valle-Pérez et al.
 ///
 /// Each is an SVG with a caption, its numbers as CSV beside it. A figure shows one transition of a
 /// test clip, or of each that --clip names: by default the one in the middle of the first. Captions
@@ -40,7 +40,7 @@ pub struct FiguresArgs {
     /// Folder for the figures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A run to set beside: in figures 11 and 12 of Pan et al., 3 to 6 of Li et al.; may be
+    /// A run to set beside: in figures 11 to 13 of Pan et al., 3 to 6 of Li et al.; may be
     /// repeated
     #[arg(long, value_name = "RUN_DIR_OR_CONFIG")]
     compare: Vec<PathBuf>,
@@ -56,8 +56,8 @@ pub struct FiguresArgs {
     /// dance for Pu and Shan [default: 0]
     #[arg(long, value_name = "FRAME")]
     start: Option<usize>,
-    /// Frames from keyframe to keyframe [default: 100 for Pan et al., 30 for Li et al.]; of the
-    /// dance, with its seed, for Pu and Shan [default: 240]
+    /// Frames from keyframe to keyframe [default: 100 for Pan et al., 50 of its cyclic motion, 30
+    /// for Li et al.]; of the dance, with its seed, for Pu and Shan [default: 240]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=10_000))]
     length: Option<u16>,
     /// Show the transition in the motion viewer, too: one HTML page

@@ -320,6 +320,60 @@ fn the_caption_of_figure_5_says_how_many_clips_it_shows() {
 }
 
 #[test]
+fn figure_13_sets_a_model_that_does_not_control_its_root_onto_the_recorded_one() {
+    let cyclic = |name: &str, model: &str| {
+        let shared = "paper = 'pan2021_cyclic'\n[data]\nsplit = { share = 0.8 }\n[model]\n";
+        let path = FIXTURE.path(name).with_extension("toml");
+        fs::write(&path, format!("name = '{name}'\n{shared}{model}")).unwrap();
+        path
+    };
+    let interpolation = cyclic("slerped", "kind = 'interpolation'\n");
+    let recurrent = cyclic(
+        "recurrent",
+        "kind = 'harvey2020'\nhidden = 8\ncode = 8\nrecurrent = 8\n\
+         [schedule]\nmax_len = 6\nfraction = 0.01\nbatch_size = 8\nshards = 1\n",
+    );
+    keydance("train")
+        .arg(recurrent)
+        .arg("--data")
+        .arg(FIXTURE.path("data"))
+        .arg("--out")
+        .arg(FIXTURE.path("recurrent"))
+        .assert()
+        .success();
+    let drawn = |more: &[&str]| {
+        let mut command = keydance("figures");
+        command
+            .arg(&interpolation)
+            .arg("--data")
+            .arg(FIXTURE.path("data"));
+        command
+            .arg("--compare")
+            .arg(FIXTURE.path("recurrent"))
+            .arg("--out")
+            .arg(FIXTURE.path("cyclic"))
+            .args(more);
+        command.assert()
+    };
+    drawn(&["--length", "60"]).success();
+    let caption = caption("cyclic", "figure_13");
+    let replaced = "Place and facing of the root are the recorded ones for recurrent, which is";
+    assert!(caption.starts_with("Figure 13. ") && caption.contains(replaced));
+    let skates = values("cyclic", "figure_13", "foot_skate");
+    let rows: Vec<&str> = skates.iter().map(|(row, ..)| row.as_str()).collect();
+    assert_eq!(rows, ["recurrent", "slerped"]);
+    let of = |folder: &str, figure: &str, row: &str| {
+        let all = values(folder, figure, "LRP");
+        all.into_iter().find(|(of, ..)| of == row).unwrap().2
+    };
+    let here = of("cyclic", "figure_13", "slerped");
+    assert_eq!(here, of("trained", "figure_12", "interpolation"));
+    drawn(&["--force", "--viewer", "page.html"])
+        .failure()
+        .stderr(contains("figure 13 has no page for --viewer"));
+}
+
+#[test]
 fn generate_shows_its_motion_in_the_viewer_beside_the_recorded_one() {
     let clip = first_clip(&FIXTURE.path("data"));
     let generate = |more: &[&str]| {

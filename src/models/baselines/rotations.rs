@@ -63,7 +63,7 @@ impl ModelKind for RotationBaseline {
 
     fn papers(&self) -> Vec<Paper> {
         match self {
-            Self::Slerp | Self::HeldPose => vec![li2023::DANCE, li2023::LAFAN1],
+            Self::Slerp | Self::HeldPose => li2023::PAPERS.to_vec(),
             Self::KeyPoseInterpolation | Self::HeldSeed => vec![PU2022],
         }
     }

@@ -15,7 +15,5 @@ use crate::models::li2023;
 use crate::models::rotations::RotationSettings as _;
 
 /// The line of the registry.
-pub const KIND: KindOf<Duan2022Settings> = KindOf::new(Duan2022Settings::KIND, || {
-    vec![li2023::DANCE, li2023::LAFAN1]
-})
-.called("duan");
+pub const KIND: KindOf<Duan2022Settings> =
+    KindOf::new(Duan2022Settings::KIND, || li2023::PAPERS.to_vec()).called("duan");

@@ -25,7 +25,7 @@ use crate::nn::Initialiser;
 /// The line of the registry.
 pub const KIND: KindOf<Harvey2020RotationsSettings> =
     KindOf::new(Harvey2020RotationsSettings::KIND, || {
-        vec![li2023::DANCE, li2023::LAFAN1]
+        li2023::PAPERS.to_vec()
     })
     .called("harvey");
 

@@ -28,7 +28,10 @@ use crate::report::figures::li2023 as figures;
 
 /// The line of the registry.
 pub const KIND: KindOf<Li2023Settings> =
-    KindOf::new(Li2023Settings::KIND, || vec![DANCE, LAFAN1]).called("ours");
+    KindOf::new(Li2023Settings::KIND, || PAPERS.to_vec()).called("ours");
+
+/// The paper on all its data.
+pub const PAPERS: [Paper; 3] = [DANCE, LAFAN1, MARTIAL];
 
 /// The paper's tables on its dance data.
 pub const DANCE: Paper = Paper {
@@ -36,6 +39,16 @@ pub const DANCE: Paper = Paper {
     ..Paper::new(
         "li2023",
         include_str!("../../../experiments/li2023/paper.toml"),
+        |data, options| vec![Box::new(InBetweening::dance(data, options))],
+    )
+};
+
+/// Its figures on martial arts, of which it prints no numbers.
+pub const MARTIAL: Paper = Paper {
+    figures: Some(figures::draw),
+    ..Paper::new(
+        "li2023_martial",
+        include_str!("../../../experiments/li2023_martial/paper.toml"),
         |data, options| vec![Box::new(InBetweening::dance(data, options))],
     )
 };

@@ -36,6 +36,8 @@ pub enum Output {
 pub struct LossWeights {
     pub rec: f64,
     pub con: f64,
+    /// Of L_contact inside L_con (eq. 5); 0 for a training without it (section 5).
+    pub contact: f64,
     pub root: f64,
     /// 0 for "Without L_key".
     pub key: f64,
@@ -51,6 +53,7 @@ impl Default for LossWeights {
         Self {
             rec: 0.3,
             con: 0.2,
+            contact: 1.0,
             root: 0.15,
             key: 0.2,
             vfac: 0.15,
@@ -225,6 +228,7 @@ impl Pan2021Config {
         for (key, value) in [
             ("loss.rec", loss.rec),
             ("loss.con", loss.con),
+            ("loss.contact", loss.contact),
             ("loss.root", loss.root),
             ("loss.key", loss.key),
             ("loss.vfac", loss.vfac),

@@ -74,7 +74,9 @@ pub(super) fn terms<T: Real>(
     let mut all = vec![
         ("rec", weights.rec, tape.affine(rec, mean, 0.0)),
         ("bone", weights.con, tape.affine(bone, mean, 0.0)),
-        ("contact", weights.con, tape.affine(contact, mean, 0.0)),
+        ("contact", weights.con * weights.contact, {
+            tape.affine(contact, mean, 0.0)
+        }),
         ("velocity", weights.con, tape.affine(velocity, mean, 0.0)),
         ("root", weights.root, tape.affine(root, mean, 0.0)),
         // The weights of eq. 10 hold the mean over the frames.

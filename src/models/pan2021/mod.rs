@@ -46,6 +46,19 @@ pub const PAPER: Paper = Paper {
     },
 };
 
+/// The paper's comparison on cyclic motion (section 4.3), of which it prints no numbers.
+pub const CYCLIC: Paper = Paper {
+    figures: Some(crate::report::figures::pan2021::cyclic::draw),
+    ..Paper::new(
+        "pan2021_cyclic",
+        include_str!("../../../experiments/pan2021_cyclic/paper.toml"),
+        |data, options| {
+            let scoring = TransitionScoring::new(data.features(), options);
+            vec![Box::new(Equations(scoring))]
+        },
+    )
+};
+
 fn protocols(data: &DataConfig, options: &EvaluationOptions) -> Vec<Box<dyn Protocol>> {
     let scoring = TransitionScoring::new(data.features(), options);
     vec![

@@ -12,7 +12,7 @@ use crate::models::baselines::linear_positions::LinearPositions;
 use crate::models::baselines::zero_velocity::ZeroVelocity;
 use crate::models::harvey2020::{Harvey2020, Harvey2020Config};
 use crate::models::kind::{ModelKind, Paper};
-use crate::models::pan2021::{Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
+use crate::models::pan2021::{CYCLIC, Controllers, PAPER, Pan2021, Pan2021Config, TRANSFORMERS};
 use crate::models::settings::{ModelSettings, ValueError, without_weights};
 use crate::models::{Generator, ModelError, li2023};
 use crate::motion::Mapping;
@@ -63,8 +63,8 @@ impl ModelKind for Kind {
 
     fn papers(&self) -> Vec<Paper> {
         match self {
-            Self::Pan2021 => vec![PAPER, li2023::DANCE, li2023::LAFAN1],
-            _ => vec![PAPER],
+            Self::Pan2021 => [&[PAPER, CYCLIC], &li2023::PAPERS[..]].concat(),
+            _ => vec![PAPER, CYCLIC],
         }
     }
 

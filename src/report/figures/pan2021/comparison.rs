@@ -3,11 +3,10 @@
 use super::root::{root_distance, row_with_paths};
 use super::stage::{Generated, Stage, positions};
 use super::wording::mean;
-use crate::evaluation::equations::{WindowScores, window_scores};
+use crate::evaluation::equations::WindowScores;
 use crate::motion::placement::world_positions;
 use crate::report::figures::{Figure, Numbers};
 use crate::report::{MotionFigure, MotionRow, PathView, Placing, ReportError, Shown};
-use ndarray::s;
 
 /// Frames from one drawn dancer to the next.
 const EVERY: usize = 10;
@@ -65,16 +64,7 @@ pub fn figure_12(stage: &Stage, entries: &[Entry]) -> Result<Figure, ReportError
     } in entries
     {
         rows.push(generated[0].row(name));
-        let scores = stage.windows().iter().zip(generated).map(|(window, it)| {
-            window_scores(window.recorded.view(), it.frames.slice(s![1.., ..]))
-        });
-        let scores: Vec<WindowScores> =
-            scores
-                .collect::<Result<_, _>>()
-                .map_err(|source| ReportError::Scores {
-                    model: name.clone(),
-                    source,
-                })?;
+        let scores = stage.scores(name, generated)?;
         let of = |score: fn(&WindowScores) -> f64| mean(scores.iter().map(score));
         let lrp = of(|scores| scores.body_position);
         numbers.add(name, "LRP", lrp, "cm");

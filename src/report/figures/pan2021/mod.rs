@@ -1,6 +1,7 @@
-//! Figures 4 (b) to 12 of Pan et al. 2021, drawn with trained models.
+//! Figures 4 (b) to 13 of Pan et al. 2021, drawn with trained models.
 
 mod comparison;
+pub mod cyclic;
 mod lengths;
 mod root;
 mod stage;
@@ -17,26 +18,14 @@ use crate::synthesis::{SynthesisOptions, synthesise};
 use comparison::Entry;
 use stage::Stage;
 
-/// Draws them all.
+/// Draws all but figure 13, which is of other data.
 ///
 /// # Errors
 /// Models that were made for other features of the data cannot be compared; the shown clip is not
 /// there; a model fails.
 pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
-    asked.without_rows()?;
+    check(asked)?;
     let data = &asked.subject.config.data;
-    for other in asked.compared {
-        let theirs = &other.config.data;
-        if (data.fps, data.features(), &data.mapping)
-            != (theirs.fps, theirs.features(), &theirs.mapping)
-        {
-            return Err(ReportError::Refused(format!(
-                "{} was made for data at another rate, or with another mapping, contact threshold \
-                 or facing_sigma than {}: they cannot be compared",
-                other.what, asked.subject.what
-            )));
-        }
-    }
     let clips = DanceClip::measure_all(&asked.dataset.test, &data.features())
         .map_err(|error| ModelError::data(&error))?;
     let stage = Stage::new(&clips, asked)?;
@@ -52,6 +41,25 @@ pub fn draw(asked: &FigureRequest<'_>) -> Result<DrawnFigures, ReportError> {
         left_out: Vec::new(),
         page: asked.page.then(|| cast.page(&stage)).transpose()?,
     })
+}
+
+/// Refuses rows, and models to set beside that were made for other features of the data.
+fn check(asked: &FigureRequest<'_>) -> Result<(), ReportError> {
+    asked.without_rows()?;
+    let data = &asked.subject.config.data;
+    for other in asked.compared {
+        let theirs = &other.config.data;
+        if (data.fps, data.features(), &data.mapping)
+            != (theirs.fps, theirs.features(), &theirs.mapping)
+        {
+            return Err(ReportError::Refused(format!(
+                "{} was made for data at another rate, or with another mapping, contact threshold \
+                 or facing_sigma than {}: they cannot be compared",
+                other.what, asked.subject.what
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The models of the figures.

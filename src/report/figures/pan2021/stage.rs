@@ -5,6 +5,7 @@ use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
 use crate::counted::counted;
+use crate::evaluation::equations::{WindowScores, window_scores};
 use crate::models::transition::{DanceClip, check_frames, window_features};
 use crate::models::{Generator, ModelError, Request};
 use crate::motion::JOINTS;
@@ -163,6 +164,26 @@ impl<'d> Stage<'d> {
             Ok(Generated { request, frames })
         });
         generated.collect()
+    }
+
+    /// Scores of what a model made of every window.
+    ///
+    /// # Errors
+    /// Predictions that do not fit.
+    pub fn scores(
+        &self,
+        model: &str,
+        generated: &[Generated],
+    ) -> Result<Vec<WindowScores>, ReportError> {
+        let pairs = self.windows.iter().zip(generated);
+        let scores = pairs.map(|(window, it)| {
+            window_scores(window.recorded.view(), it.frames.slice(s![1.., ..]))
+        });
+        let scores: Result<_, _> = scores.collect();
+        scores.map_err(|source| ReportError::Scores {
+            model: model.into(),
+            source,
+        })
     }
 }
 
