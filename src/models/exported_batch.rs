@@ -40,6 +40,22 @@ impl ExportOptions {
             }),
         }
     }
+
+    /// Refuses another number of frames than the one that a model has, the value of `key`.
+    ///
+    /// # Errors
+    /// Another is asked for.
+    pub fn check_frames(&self, own: usize, key: &str) -> Result<(), ModelError> {
+        match self.frames.filter(|frames| *frames != own) {
+            None => Ok(()),
+            Some(frames) => Err(ModelError::Data {
+                reason: format!(
+                    "--frames {frames}: the model has {own} ({key}) and no other number; leave it \
+                     out"
+                ),
+            }),
+        }
+    }
 }
 
 /// Arrays by name.

@@ -15,10 +15,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-use super::Statistics;
-use crate::autograd::Parameters;
+use super::settings::{InitialRng, LoadError};
+use super::{ModelError, Statistics, Streams};
+use crate::autograd::{Parameters, Real};
 use crate::data::{file_digest, hexadecimal};
-use crate::nn::MOST_WEIGHTS;
+use crate::nn::{Initialiser, MOST_WEIGHTS};
 use crate::run::FileError;
 
 const METADATA: &str = "keydance";
@@ -248,14 +249,33 @@ impl SavedWeights {
         2 * weights + (1 << 20)
     }
 
+    /// A network and its parameters with these values; `statistics` as in
+    /// [`SavedWeights::load_into`].
+    ///
+    /// # Errors
+    /// It cannot be built, or the values are those of another one.
+    pub fn network<T: Real, N>(
+        &self,
+        statistics: &Statistics,
+        build: impl FnOnce(&mut Initialiser<'_, T, InitialRng>) -> Result<N, ModelError>,
+    ) -> Result<(N, Parameters<T>), LoadError> {
+        let mut parameters = Parameters::new();
+        // Overwritten by the saved values, whatever is drawn.
+        let rng = Streams::new(0).initialisation();
+        let mut init = Initialiser::limited(&mut parameters, rng, self.most_weights());
+        let network = build(&mut init)?;
+        self.load_into(&mut parameters, statistics)?;
+        Ok((network, parameters))
+    }
+
     /// Puts the values into a model's parameters and buffers. `statistics` are what else the file
     /// may hold.
     ///
     /// # Errors
     /// The file and the model do not have the same names and shapes; then nothing is changed.
-    pub fn load_into(
+    pub fn load_into<T: Real>(
         &self,
-        parameters: &mut Parameters<f32>,
+        parameters: &mut Parameters<T>,
         statistics: &Statistics,
     ) -> Result<(), WeightsError> {
         for (name, value) in parameters.saved() {
@@ -274,7 +294,7 @@ impl SavedWeights {
         }
         for (name, mut value) in parameters.saved_mut() {
             if let Some(saved) = self.arrays.get(name) {
-                value.assign(saved);
+                value.zip_mut_with(saved, |to, &from| *to = T::from_f64(from.into()));
             }
         }
         Ok(())

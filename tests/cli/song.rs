@@ -420,7 +420,9 @@ fn a_batch_has_the_windows_of_the_model_and_other_wishes_are_refused() {
         command.arg("--out").arg(&out).assert()
     };
     let refused = export(&["--frames", "30"]).failure();
-    refused.stderr(contains("--frames 30: the model's windows have 60 frames"));
+    refused.stderr(contains(
+        "--frames 30: the model has 60 (window.length) and no other number",
+    ));
     let refused = export(&["--ground-truth"]).failure();
     refused.stderr(contains("--ground-truth: the model is never fed"));
     assert!(!out.exists());

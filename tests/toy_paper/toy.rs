@@ -85,10 +85,8 @@ impl ModelSettings for Toy {
     }
 
     fn trained(&self, name: &str, saved: &SavedWeights) -> Result<Box<dyn Generator>, LoadError> {
-        let mut parameters = Parameters::new();
-        let rng = Streams::new(0).initialisation();
-        let weights = Weights::new(&mut Initialiser::new(&mut parameters, rng));
-        saved.load_into(&mut parameters, &Statistics::default())?;
+        let none = Statistics::default();
+        let (weights, parameters) = saved.network(&none, |init| Ok(Weights::new(init)))?;
         Ok(Box::new(TrainedToy::new(name, &weights, &parameters)))
     }
 }

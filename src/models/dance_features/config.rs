@@ -145,6 +145,13 @@ impl ScheduleConfig {
 }
 
 impl GenerationConfig {
+    /// Its keys, none of which the weights depend on.
+    pub const KEYS: &'static [&'static str] = &[
+        "generation.temperature",
+        "generation.clamp",
+        "generation.pad_audio",
+    ];
+
     /// # Errors
     /// A value outside its range.
     pub fn check(&self) -> Result<(), ValueError> {

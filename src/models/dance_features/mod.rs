@@ -7,7 +7,8 @@
 //! - [`scale`]: means and deviations;
 //! - [`features`]: all of it, fitted to the training part, saved and read back;
 //! - [`pieces`]: the parts of a data set in these numbers;
-//! - [`windows`]: at which frames there is a window, [`epochs`]: in which order they are trained;
+//! - [`windows`]: at which frames there is a window, [`epochs`]: in which order they are trained,
+//!   [`training`]: both, of the training pieces;
 //! - [`given`]: from a request to these numbers, and back to a dance; [`sampled`]: a dance that
 //!   grows;
 //! - [`mod@made_up`]: generated dances, for timings.
@@ -22,6 +23,7 @@ pub mod music;
 pub mod pieces;
 pub mod sampled;
 pub mod scale;
+pub mod training;
 pub mod windows;
 
 pub use config::{Audio, AugmentationConfig, FeaturesConfig, GenerationConfig, ScheduleConfig};
@@ -33,4 +35,5 @@ pub use music::{AudioColumns, heard, heard_by};
 pub use pieces::{DanceData, Piece, with_noise};
 pub use sampled::SampledFrames;
 pub use scale::Scale;
+pub use training::{TrainingWindow, TrainingWindows};
 pub use windows::Contexts;

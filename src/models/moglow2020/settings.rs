@@ -11,7 +11,7 @@ use super::task::{MoglowTask, Sequence, sequence_batch};
 use crate::autograd::check::CheckReport;
 use crate::autograd::{AutogradError, Parameters, Real, Tape, Workspace};
 use crate::data::DataConfig;
-use crate::models::dance_features::{Endless, Piece, made_up};
+use crate::models::dance_features::{Endless, GenerationConfig, Piece, made_up};
 use crate::models::exported_batch::{ExportOptions, ExportedBatch, spread};
 use crate::models::gradient_report::check_losses;
 use crate::models::settings::{
@@ -90,12 +90,9 @@ impl MoglowSettings {
     fn load(&self, saved: &SavedWeights) -> Result<Loaded, LoadError> {
         let reference = Reference::saved(saved, self)?;
         let (motion, audio) = reference.features.widths();
-        let mut parameters = Parameters::new();
-        // Overwritten by the saved values, whatever is drawn.
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = self.build(&mut init, motion, audio)?;
-        saved.load_into(&mut parameters, &reference.statistics())?;
+        let (network, parameters) = saved.network(&reference.statistics(), |init| {
+            self.build(init, motion, audio)
+        })?;
         Ok(Loaded {
             network,
             parameters,
@@ -164,11 +161,7 @@ impl ModelSettings for MoglowSettings {
     }
 
     fn keys_after_the_network(&self) -> &'static [&'static str] {
-        &[
-            "generation.temperature",
-            "generation.clamp",
-            "generation.pad_audio",
-        ]
+        GenerationConfig::KEYS
     }
 
     fn task<'d>(
@@ -229,25 +222,16 @@ impl ModelSettings for MoglowSettings {
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
         options.check_not_fed()?;
-        let sequence = self.model.sequence;
-        if let Some(frames) = options.frames.filter(|frames| *frames != sequence) {
-            let reason = format!(
-                "--frames {frames}: the model's sequences have {sequence} frames (model.sequence); \
-                 leave it out"
-            );
-            return Err(ModelError::Data { reason }.into());
-        }
+        options.check_frames(self.model.sequence, "model.sequence")?;
         let loaded = self.load(saved)?;
         let batch = self.exported_sequences(&loaded.reference, setting, options)?;
         let mut exported = ExportedBatch::default();
         let results = if options.double {
             let (motion, audio) = loaded.reference.features.widths();
-            let mut parameters = Parameters::<f64>::new();
-            let rng = Streams::new(0).initialisation();
-            let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-            let network = self.build(&mut init, motion, audio)?;
-            let pairs = parameters.saved_mut().zip(loaded.parameters.saved());
-            pairs.for_each(|((_, mut to), (_, from))| to.assign(&from.mapv(f64::from)));
+            let (network, parameters) = saved
+                .network::<f64, _>(&loaded.reference.statistics(), |init| {
+                    self.build(init, motion, audio)
+                })?;
             let batch = SequenceBatch {
                 condition: batch.condition.mapv(f64::from),
                 target: batch.target.mapv(f64::from),

@@ -5,17 +5,16 @@ use std::sync::Arc;
 
 use ndarray::{Array2, ArrayView2, s};
 use rand::RngExt as _;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 use super::config::{MoglowConfig, MoglowSettings};
 use super::flow::{Moglow2020, SequenceBatch};
 use super::generator::{Reference, TrainedMoglow};
 use crate::autograd::{AutogradError, Parameters, Tape};
 use crate::counted::counted;
-use crate::models::dance_features::{DanceData, Epochs, Piece, with_noise};
+use crate::models::dance_features::TrainingWindows;
 use crate::models::settings::{InitialRng, TaskSetting};
-use crate::models::transition::parts;
-use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Streams, Task};
+use crate::models::{Generator, LossTerms, ModelError, Statistics, Step, Task};
 use crate::nn::Initialiser;
 
 /// The training of a network on dances with their music.
@@ -23,10 +22,7 @@ pub struct MoglowTask {
     settings: MoglowSettings,
     network: Arc<Moglow2020>,
     reference: Reference,
-    pieces: Vec<Piece>,
-    epochs: Epochs,
-    streams: Streams,
-    warnings: Vec<String>,
+    windows: TrainingWindows,
 }
 
 /// What a sequence is made of: motion from `motion_past` frames before it to its end, and music from
@@ -82,37 +78,26 @@ impl MoglowTask {
         setting: &TaskSetting<'_>,
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Self, ModelError> {
-        let mirror = settings.augmentation.mirror;
         let known = setting.start.map(|start| Reference::saved(start, settings));
         let known = known
             .transpose()
             .map_err(|error| ModelError::data(&error))?;
-        let mut data = match known {
-            Some(known) => DanceData::in_numbers(known.features, setting.dataset, mirror)?,
-            None => DanceData::of(setting.dataset, &settings.features, mirror)?,
-        };
-        data.keep(&settings.schedule.clips)?;
-        let DanceData {
-            features,
-            train,
-            warnings,
-            ..
-        } = data;
-        let frames: Vec<usize> = train.iter().map(Piece::frames).collect();
-        let contexts = settings.model.sequence_contexts();
-        let batch = settings.schedule.batch_size;
-        let epochs = Epochs::new(&frames, contexts, batch, setting.streams)?;
+        let (windows, features) = TrainingWindows::new(
+            setting,
+            known.map(|known| known.features),
+            &settings.features,
+            &settings.augmentation,
+            &settings.schedule,
+            settings.model.sequence_contexts(),
+        )?;
         let (motion, audio) = features.widths();
         let task = Self {
             network: settings.build(init, motion, audio)?.into(),
             reference: Reference::new(features, settings),
             settings: settings.clone(),
-            pieces: train,
-            epochs,
-            streams: setting.streams,
-            warnings,
+            windows,
         };
-        let first = task.batch(0, 0..batch);
+        let first = task.batch(0, 0..task.windows.batch());
         let started = task.network.start(init.parameters_mut(), &first);
         started.map_err(|error| ModelError::data(&error))?;
         Ok(task)
@@ -120,50 +105,38 @@ impl MoglowTask {
 
     /// Sequences of a step.
     fn batch(&self, step: u64, range: Range<usize>) -> SequenceBatch<f32> {
-        let contexts = self.settings.model.sequence_contexts();
         let dropout = self.settings.model.pose_dropout;
-        let noise = self.settings.augmentation.target_noise;
-        let windows = self.epochs.batch(step);
-        let windows = windows.iter().enumerate();
-        let sequences = windows
-            .skip(range.start)
-            .take(range.len())
-            .map(|(index, at)| {
-                let piece = &self.pieces[at.piece];
-                let rows = at.frame - contexts.motion..at.frame + contexts.predicted;
-                let indices = [step, index as u64];
-                let mut rng = self.streams.stream("target_noise", &indices);
-                let motion = with_noise(piece.motion.slice(s![rows, ..]), noise, &mut rng);
-                let mut known = motion.clone();
-                if dropout > 0.0 {
-                    let mut rng = self.streams.stream("pose_dropout", &indices);
-                    for mut frame in known.rows_mut() {
-                        if rng.random::<f64>() < dropout {
-                            frame.fill(0.0);
-                        }
+        let windows = self.windows.of(step, range).into_iter();
+        let sequences = windows.map(|window| {
+            let mut known = window.motion.clone();
+            if dropout > 0.0 {
+                let streams = self.windows.streams();
+                let mut rng = streams.stream("pose_dropout", &[step, window.number]);
+                for mut frame in known.rows_mut() {
+                    if rng.random::<f64>() < dropout {
+                        frame.fill(0.0);
                     }
                 }
-                Sequence {
-                    known,
-                    motion,
-                    audio: piece.audio.slice(s![contexts.audio_rows(at.frame), ..]),
-                }
-            });
+            }
+            Sequence {
+                known,
+                motion: window.motion,
+                audio: window.audio,
+            }
+        });
         let sequences: Vec<Sequence<'_>> = sequences.collect();
         let model = &self.settings.model;
-        let total = self.settings.schedule.batch_size;
-        sequence_batch(model, &sequences, model.sequence, total)
+        sequence_batch(model, &sequences, model.sequence, self.windows.batch())
     }
 }
 
 impl Task<f32> for MoglowTask {
     fn steps(&self) -> u64 {
-        self.settings.schedule.steps
+        self.windows.steps()
     }
 
     fn frame_steps(&self) -> u64 {
-        let frames = self.settings.schedule.batch_size * self.settings.model.sequence;
-        self.settings.schedule.steps * frames as u64
+        self.steps() * self.windows.frames()
     }
 
     fn step(&self, step: u64) -> Box<dyn Step<f32> + '_> {
@@ -171,7 +144,7 @@ impl Task<f32> for MoglowTask {
     }
 
     fn place(&self, step: u64) -> [u64; 2] {
-        self.epochs.place(step)
+        self.windows.place(step)
     }
 
     fn statistics(&self) -> Statistics {
@@ -184,23 +157,15 @@ impl Task<f32> for MoglowTask {
     }
 
     fn summary(&self) -> Option<String> {
-        let epoch = self.epochs.batches() as u64;
-        let epochs = self.settings.schedule.steps as f64 / epoch as f64;
-        Some(format!("{epochs:.1} epochs of {epoch} steps"))
+        Some(self.windows.summary())
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
+        self.windows.warnings().to_vec()
     }
 
     fn facts(&self) -> Map<String, Value> {
-        let features = &self.reference.features;
-        Map::from_iter([
-            ("training_windows".into(), json!(self.epochs.windows())),
-            ("motion_columns".into(), json!(features.widths().0)),
-            ("audio_columns".into(), json!(features.widths().1)),
-            ("bits_of_deviations".into(), json!(features.motion.bits())),
-        ])
+        self.windows.facts(&self.reference.features)
     }
 }
 
@@ -212,28 +177,22 @@ struct MoglowStep<'t> {
 
 impl Step<f32> for MoglowStep<'_> {
     fn shards(&self) -> usize {
-        self.task.settings.schedule.shards()
+        self.task.windows.shards()
     }
 
     fn frames(&self) -> u64 {
-        let settings = &self.task.settings;
-        (settings.schedule.batch_size * settings.model.sequence) as u64
+        self.task.windows.frames()
     }
 
     fn losses(&self, tape: &mut Tape<'_, f32>, shard: usize) -> Result<LossTerms, AutogradError> {
-        let total = self.task.settings.schedule.batch_size;
-        let range = parts(total, self.shards()).nth(shard).unwrap_or(0..0);
-        self.task
-            .network
-            .losses(tape, &self.task.batch(self.step, range))
+        let sequences = self.task.windows.shard(shard);
+        let batch = self.task.batch(self.step, sequences);
+        self.task.network.losses(tape, &batch)
     }
 
     fn describe(&self) -> String {
-        let settings = &self.task.settings;
-        let sequences = counted(settings.schedule.batch_size, "sequence");
-        format!(
-            "{sequences} of {}",
-            counted(settings.model.sequence, "frame")
-        )
+        let frames = self.task.settings.model.sequence;
+        let sequences = counted(self.task.windows.batch(), "sequence");
+        format!("{sequences} of {}", counted(frames, "frame"))
     }
 }

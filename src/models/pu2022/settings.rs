@@ -108,14 +108,10 @@ impl Pu2022Settings {
             mean: statistic(MEAN)?,
             deviation: statistic(DEVIATION)?,
         };
-        let mut parameters = Parameters::new();
-        // Overwritten by the saved values, whatever is drawn.
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
         let joints = body.joints();
-        let network = self.build(&mut init, joints)?;
         let reference = Reference::new(body, music, self)?;
-        saved.load_into(&mut parameters, &reference.statistics())?;
+        let (network, parameters) =
+            saved.network(&reference.statistics(), |init| self.build(init, joints))?;
         Ok(Loaded {
             network,
             parameters,
@@ -226,25 +222,16 @@ impl ModelSettings for Pu2022Settings {
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
         options.check_not_fed()?;
-        let length = self.window.length;
-        if let Some(frames) = options.frames.filter(|frames| *frames != length) {
-            let reason = format!(
-                "--frames {frames}: the model's windows have {length} frames (window.length); \
-                 leave it out"
-            );
-            return Err(ModelError::Data { reason }.into());
-        }
+        options.check_frames(self.window.length, "window.length")?;
         let loaded = self.load(saved)?;
         let windows = self.exported_windows(setting, options)?;
         let (given, truths): (Vec<_>, Vec<_>) = windows.into_iter().unzip();
         let mut exported = ExportedBatch::default();
         let results = if options.double {
-            let mut parameters = Parameters::<f64>::new();
-            let rng = Streams::new(0).initialisation();
-            let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-            let network = self.build(&mut init, loaded.joints)?;
-            let pairs = parameters.saved_mut().zip(loaded.parameters.saved());
-            pairs.for_each(|((_, mut to), (_, from))| to.assign(&from.mapv(f64::from)));
+            let (network, parameters) = saved
+                .network::<f64, _>(&loaded.reference.statistics(), |init| {
+                    self.build(init, loaded.joints)
+                })?;
             let batch = Batch::of(&given, &truths, &self.window, &self.loss);
             self.add_results(&mut exported, &network, &parameters, &batch)
         } else {

@@ -9,9 +9,8 @@ use crate::data::WindowCut;
 use crate::models::exported_batch::{ExportOptions, ExportedBatch, FRAMES, spread};
 use crate::models::settings::{LoadError, TaskSetting};
 use crate::models::weights::SavedWeights;
-use crate::models::{ModelError, Streams};
+use crate::models::{ModelError, Statistics};
 use crate::motion::Feet;
-use crate::nn::Initialiser;
 
 /// Random masks are off. W windows of T frames, rows = W T: `input [rows, 4 J]`,
 /// `keyframes [rows, 2]`, `contacts [rows, 2]`, `distances [rows, 1]`, `offsets [rows, 3 J]`,
@@ -67,12 +66,10 @@ pub(super) fn export<S: RotationSettings>(
     let mut exported = ExportedBatch::default();
     let input = model.network.input();
     let results = if options.double {
-        let mut parameters = Parameters::<f64>::new();
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = build(settings, &mut init, &model.body, &model.statistics)?;
-        let pairs = parameters.saved_mut().zip(model.parameters.saved());
-        pairs.for_each(|((_, mut to), (_, from))| to.assign(&from.mapv(f64::from)));
+        let (body, statistics) = (&model.body, &model.statistics);
+        let known = statistics.statistics(body.statistics(Statistics::default()));
+        let (network, parameters) =
+            saved.network::<f64, _>(&known, |init| build(settings, init, body, statistics))?;
         let batch = Batch::of(&given, &truths, input);
         add_results(&mut exported, &*network, &parameters, &batch)
     } else {

@@ -96,13 +96,9 @@ pub(super) fn loaded<S: RotationSettings>(
 ) -> Result<Loaded, LoadError> {
     let body = Body::saved(saved)?;
     let statistics = WindowStatistics::saved(saved, &body)?;
-    let mut parameters = Parameters::new();
-    // Overwritten by the saved values, whatever is drawn.
-    let rng = Streams::new(0).initialisation();
-    let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-    let network = build(settings, &mut init, &body, &statistics)?;
     let known = statistics.statistics(body.statistics(Statistics::default()));
-    saved.load_into(&mut parameters, &known)?;
+    let (network, parameters) =
+        saved.network(&known, |init| build(settings, init, &body, &statistics))?;
     Ok(Loaded {
         body,
         statistics,

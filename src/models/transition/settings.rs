@@ -10,7 +10,6 @@ use super::gradient_check::{self, GradientCheckError};
 use super::made_up::{MADE_UP_FRAMES, MadeUpTask};
 use super::task::TransitionTask;
 use super::{DanceClip, ModelConfig, Standardisation, TrainedModel};
-use crate::autograd::Parameters;
 use crate::autograd::check::CheckReport;
 use crate::data::{ClipSource, DataConfig};
 use crate::experiment::ExperimentConfig;
@@ -210,12 +209,9 @@ impl TransitionSettings {
     /// The weights are those of another model.
     pub fn load(&self, name: &str, saved: &SavedWeights) -> Result<TrainedModel, LoadError> {
         let standardisation = Standardisation::saved(saved)?;
-        let mut parameters = Parameters::new();
-        // Overwritten by the saved values, whatever is drawn.
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = self.model.build(&mut init, &standardisation)?;
-        saved.load_into(&mut parameters, &standardisation.statistics())?;
+        let (network, parameters) = saved.network(&standardisation.statistics(), |init| {
+            self.model.build(init, &standardisation)
+        })?;
         let root_frame = self.model.root_frame();
         Ok(TrainedModel::new(
             name.into(),

@@ -11,7 +11,7 @@ use super::task::{ValleperezTask, window_batch};
 use crate::autograd::check::CheckReport;
 use crate::autograd::{AutogradError, Parameters, Real, Tape, Workspace};
 use crate::data::DataConfig;
-use crate::models::dance_features::{Endless, Piece, made_up};
+use crate::models::dance_features::{Endless, GenerationConfig, Piece, made_up};
 use crate::models::exported_batch::{ExportOptions, ExportedBatch, spread};
 use crate::models::gradient_report::check_losses;
 use crate::models::settings::{
@@ -99,12 +99,9 @@ impl ValleperezSettings {
     fn load(&self, saved: &SavedWeights) -> Result<Loaded, LoadError> {
         let reference = Reference::saved(saved, self)?;
         let (motion, audio) = reference.features.widths();
-        let mut parameters = Parameters::new();
-        // Overwritten by the saved values, whatever is drawn.
-        let rng = Streams::new(0).initialisation();
-        let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-        let network = self.build(&mut init, motion, audio, None)?;
-        saved.load_into(&mut parameters, &reference.statistics())?;
+        let (network, parameters) = saved.network(&reference.statistics(), |init| {
+            self.build(init, motion, audio, None)
+        })?;
         Ok(Loaded {
             network,
             parameters,
@@ -173,11 +170,7 @@ impl ModelSettings for ValleperezSettings {
     }
 
     fn keys_after_the_network(&self) -> &'static [&'static str] {
-        &[
-            "generation.temperature",
-            "generation.clamp",
-            "generation.pad_audio",
-        ]
+        GenerationConfig::KEYS
     }
 
     fn task<'d>(
@@ -241,25 +234,16 @@ impl ModelSettings for ValleperezSettings {
         options: &ExportOptions,
     ) -> Result<ExportedBatch, LoadError> {
         options.check_not_fed()?;
-        let predicted = self.model.predicted_frames;
-        if let Some(frames) = options.frames.filter(|frames| *frames != predicted) {
-            let reason = format!(
-                "--frames {frames}: the model predicts {predicted} frames together \
-                 (model.predicted_frames); leave it out"
-            );
-            return Err(ModelError::Data { reason }.into());
-        }
+        options.check_frames(self.model.predicted_frames, "model.predicted_frames")?;
         let loaded = self.load(saved)?;
         let batch = self.exported_windows(&loaded.reference, setting, options)?;
         let mut exported = ExportedBatch::default();
         let results = if options.double {
             let (motion, audio) = loaded.reference.features.widths();
-            let mut parameters = Parameters::<f64>::new();
-            let rng = Streams::new(0).initialisation();
-            let mut init = Initialiser::limited(&mut parameters, rng, saved.most_weights());
-            let network = self.build(&mut init, motion, audio, None)?;
-            let pairs = parameters.saved_mut().zip(loaded.parameters.saved());
-            pairs.for_each(|((_, mut to), (_, from))| to.assign(&from.mapv(f64::from)));
+            let (network, parameters) = saved
+                .network::<f64, _>(&loaded.reference.statistics(), |init| {
+                    self.build(init, motion, audio, None)
+                })?;
             let batch = WindowBatch {
                 motion: batch.motion.mapv(f64::from),
                 audio: batch.audio.mapv(f64::from),

@@ -1,6 +1,7 @@
 //! The training: all windows of the training pieces, shuffled anew in every epoch (spec, sections 1
 //! and 6).
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ndarray::{Array2, ArrayView2, s};
@@ -12,11 +13,10 @@ use super::network::{Valleperez2021, WindowBatch};
 use super::target::{LOOK_BACK, Target};
 use crate::autograd::{AutogradError, Parameters, Tape, Var};
 use crate::counted::counted;
-use crate::models::dance_features::{DanceData, Epochs, Piece, with_noise};
+use crate::models::dance_features::TrainingWindows;
 use crate::models::flow::NormKind;
 use crate::models::settings::{InitialRng, TaskSetting};
-use crate::models::transition::parts;
-use crate::models::{Generator, LossTerms, Meeting, ModelError, Statistics, Step, Streams, Task};
+use crate::models::{Generator, LossTerms, Meeting, ModelError, Statistics, Step, Task};
 use crate::nn::Initialiser;
 
 /// The training of a network on dances with their music.
@@ -24,10 +24,7 @@ pub struct ValleperezTask {
     settings: ValleperezSettings,
     network: Arc<Valleperez2021>,
     reference: Reference,
-    pieces: Vec<Piece>,
-    epochs: Epochs,
-    streams: Streams,
-    warnings: Vec<String>,
+    windows: TrainingWindows,
 }
 
 impl ValleperezTask {
@@ -39,48 +36,32 @@ impl ValleperezTask {
         setting: &TaskSetting<'_>,
         init: &mut Initialiser<'_, f32, InitialRng>,
     ) -> Result<Self, ModelError> {
-        let mirror = settings.augmentation.mirror;
         let known = setting.start.map(|start| Reference::saved(start, settings));
         let known = known
             .transpose()
             .map_err(|error| ModelError::data(&error))?;
-        let mut data = match &known {
-            Some(known) => DanceData::in_numbers(known.features.clone(), setting.dataset, mirror)?,
-            None => DanceData::of(setting.dataset, &settings.features, mirror)?,
-        };
-        data.keep(&settings.schedule.clips)?;
-        let DanceData {
-            features,
-            train,
-            warnings,
-            ..
-        } = data;
+        let (windows, features) = TrainingWindows::new(
+            setting,
+            known.as_ref().map(|known| known.features.clone()),
+            &settings.features,
+            &settings.augmentation,
+            &settings.schedule,
+            settings.model.contexts(),
+        )?;
         // What the targets are told by is what training sees of them.
-        let noise = settings.augmentation.target_noise;
-        let seen = train.iter().enumerate().map(|(index, piece)| {
-            let mut rng = setting.streams.stream("target_fit", &[index as u64]);
-            with_noise(piece.motion.view(), noise, &mut rng)
-        });
-        let seen: Vec<Array2<f32>> = seen.collect();
+        let seen = windows.seen("target_fit");
         let views: Vec<ArrayView2<'_, f32>> = seen.iter().map(|it| it.view()).collect();
         let target = match known {
             Some(known) => known.target,
             None => Target::fitted(settings.model.target, &views),
         };
         let first = first_matrix(settings, &target, &views);
-        let frames: Vec<usize> = train.iter().map(Piece::frames).collect();
-        let contexts = settings.model.contexts();
-        let batch = settings.schedule.batch_size;
-        let epochs = Epochs::new(&frames, contexts, batch, setting.streams)?;
         let (motion, audio) = features.widths();
         let task = Self {
             network: settings.build(init, motion, audio, first.as_ref())?.into(),
             reference: Reference::new(features, target, settings),
             settings: settings.clone(),
-            pieces: train,
-            epochs,
-            streams: setting.streams,
-            warnings,
+            windows,
         };
         task.start(init.parameters_mut())?;
         Ok(task)
@@ -88,34 +69,22 @@ impl ValleperezTask {
 
     /// Starts the norms from the whole first batch.
     fn start(&self, parameters: &mut Parameters<f32>) -> Result<(), ModelError> {
-        let batch = self.batch(0, 0..self.settings.schedule.batch_size);
+        let batch = self.batch(0, 0..self.windows.batch());
         let started = self.network.start(parameters, &batch);
         started.map_err(|error| ModelError::data(&error))
     }
 
     /// Windows of a step.
-    fn batch(&self, step: u64, range: std::ops::Range<usize>) -> WindowBatch<f32> {
-        let contexts = self.settings.model.contexts();
-        let noise = self.settings.augmentation.target_noise;
-        let windows = self.epochs.batch(step);
-        let windows = windows.iter().enumerate();
-        let windows = windows.skip(range.start).take(range.len());
-        let windows = windows.map(|(index, at)| {
-            let piece = &self.pieces[at.piece];
-            let (from, to) = (at.frame - contexts.motion, at.frame + contexts.predicted);
-            let mut rng = self.streams.stream("target_noise", &[step, index as u64]);
-            let motion = with_noise(piece.motion.slice(s![from..to, ..]), noise, &mut rng);
-            (
-                motion,
-                piece.audio.slice(s![contexts.audio_rows(at.frame), ..]),
-            )
-        });
-        let windows: Vec<_> = windows.collect();
-        let windows = windows
-            .iter()
-            .map(|(motion, audio)| (motion.view(), *audio));
-        let total = self.settings.schedule.batch_size;
-        window_batch(&self.reference.target, windows, contexts.predicted, total)
+    fn batch(&self, step: u64, range: Range<usize>) -> WindowBatch<f32> {
+        let windows = self.windows.of(step, range);
+        let views = windows.iter().map(|it| (it.motion.view(), it.audio));
+        let predicted = self.settings.model.predicted_frames;
+        window_batch(
+            &self.reference.target,
+            views,
+            predicted,
+            self.windows.batch(),
+        )
     }
 }
 
@@ -164,12 +133,11 @@ fn first_matrix(
 
 impl Task<f32> for ValleperezTask {
     fn steps(&self) -> u64 {
-        self.settings.schedule.steps
+        self.windows.steps()
     }
 
     fn frame_steps(&self) -> u64 {
-        let frames = self.settings.schedule.batch_size * self.settings.model.predicted_frames;
-        self.settings.schedule.steps * frames as u64
+        self.steps() * self.windows.frames()
     }
 
     fn step(&self, step: u64) -> Box<dyn Step<f32> + '_> {
@@ -177,7 +145,7 @@ impl Task<f32> for ValleperezTask {
     }
 
     fn place(&self, step: u64) -> [u64; 2] {
-        self.epochs.place(step)
+        self.windows.place(step)
     }
 
     fn statistics(&self) -> Statistics {
@@ -190,24 +158,15 @@ impl Task<f32> for ValleperezTask {
     }
 
     fn summary(&self) -> Option<String> {
-        let epoch = self.epochs.batches() as u64;
-        let epochs = self.settings.schedule.steps as f64 / epoch as f64;
-        Some(format!("{epochs:.1} epochs of {epoch} steps"))
+        Some(self.windows.summary())
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
+        self.windows.warnings().to_vec()
     }
 
     fn facts(&self) -> Map<String, Value> {
-        let features = &self.reference.features;
-        let mut facts = Map::from_iter([
-            ("training_windows".into(), json!(self.epochs.windows())),
-            ("motion_columns".into(), json!(features.widths().0)),
-            ("audio_columns".into(), json!(features.widths().1)),
-            // What bits of standardised numbers lack to those in cm and rad.
-            ("bits_of_deviations".into(), json!(features.motion.bits())),
-        ]);
+        let mut facts = self.windows.facts(&self.reference.features);
         if self.settings.model.target != TargetKind::Pose {
             let bits = self.reference.target.log_deviations() / std::f64::consts::LN_2;
             facts.insert("bits_of_target_deviations".into(), json!(bits));
@@ -225,9 +184,8 @@ struct ValleperezStep<'t> {
 impl ValleperezStep<'_> {
     /// Windows of a shard.
     fn batch_of(&self, shard: usize) -> WindowBatch<f32> {
-        let total = self.task.settings.schedule.batch_size;
-        let range = parts(total, self.shards()).nth(shard).unwrap_or(0..0);
-        self.task.batch(self.step, range)
+        let windows = self.task.windows.shard(shard);
+        self.task.batch(self.step, windows)
     }
 
     /// Losses of windows with the density of the frames themselves: the targets are these over
@@ -251,12 +209,11 @@ impl ValleperezStep<'_> {
 
 impl Step<f32> for ValleperezStep<'_> {
     fn shards(&self) -> usize {
-        self.task.settings.schedule.shards()
+        self.task.windows.shards()
     }
 
     fn frames(&self) -> u64 {
-        let settings = &self.task.settings;
-        (settings.schedule.batch_size * settings.model.predicted_frames) as u64
+        self.task.windows.frames()
     }
 
     fn losses(&self, tape: &mut Tape<'_, f32>, shard: usize) -> Result<LossTerms, AutogradError> {
@@ -272,7 +229,7 @@ impl Step<f32> for ValleperezStep<'_> {
     }
 
     fn describe(&self) -> String {
-        counted(self.task.settings.schedule.batch_size, "window")
+        counted(self.task.windows.batch(), "window")
     }
 }
 
@@ -282,7 +239,7 @@ impl Meeting<f32> for ValleperezStep<'_> {
     }
 
     fn losses(&self, tape: &mut Tape<'_, f32>, together: Var) -> Result<LossTerms, AutogradError> {
-        let windows = 0..self.task.settings.schedule.batch_size;
+        let windows = 0..self.task.windows.batch();
         let batch = self.task.batch(self.step, windows);
         let network = &self.task.network;
         let losses = network.losses_by(tape, &batch, together, true)?;

@@ -127,11 +127,7 @@ impl ModelSettings for Settings {
     }
 
     fn keys_after_the_network(&self) -> &'static [&'static str] {
-        &[
-            "generation.temperature",
-            "generation.clamp",
-            "generation.pad_audio",
-        ]
+        GenerationConfig::KEYS
     }
 
     fn untrained(&self, _data: &DataConfig) -> Option<Box<dyn Generator>> {
