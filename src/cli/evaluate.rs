@@ -115,9 +115,11 @@ pub fn run(args: EvaluateArgs) -> anyhow::Result<ExitCode> {
         evaluated => evaluated?,
     };
     write!(out, "{}", scoring.terminal(&record)?)?;
+    // Where one cannot be written, the other is there.
+    let kept = scoring.keep(&record);
     if let Some(path) = &args.json {
         record.write_scores(path)?;
     }
-    scoring.keep(&record)?;
+    kept?;
     Ok(ExitCode::SUCCESS)
 }
